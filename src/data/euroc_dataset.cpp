@@ -6,6 +6,7 @@
 #include <opencv2/core/eigen.hpp>
 #include <stdexcept>
 
+#include "image_file.hpp"
 #include "text_file.hpp"
 
 namespace fs = std::filesystem;
@@ -36,11 +37,16 @@ std::vector<std::string> calibrationFiles(const fs::path& mav0) {
   return {left.string(), right.string()};
 }
 
+cv::Size sizeOfImages(const fs::path& mav0) {
+  return readGreyImage(listImages(mav0 / "cam0").begin()->second).size();
+}
+
 }  // namespace
 
 EurocSequence::EurocSequence(const std::string& mav0, const std::vector<std::string>& calibration, double fov)
     : directory_(mav0),
-      rectification_(readCalibration(calibration.empty() ? calibrationFiles(mav0) : calibration, fov)) {
+      rectification_(calibration.empty() ? readCalibration(calibrationFiles(mav0), fov)
+                                         : readCalibration(calibration, fov, sizeOfImages(mav0))) {
   std::map<std::int64_t, std::string> files[2];
   for (int side = 0; side < 2; ++side) files[side] = listImages(fs::path(mav0) / ("cam" + std::to_string(side)));
   for (const auto& [stamp, file] : files[0])
@@ -52,7 +58,7 @@ EurocSequence::EurocSequence(const std::string& mav0, const std::vector<std::str
 
 ImagePair EurocSequence::load(int i) const {
   const auto read = [this](const std::string& file) {
-    const cv::Mat image = readGreyPng(file);
+    const cv::Mat image = readGreyImage(file);
     if (image.size() != rectification_.raw(0).size)
       throw std::runtime_error("image '" + file + "' does not have the resolution that its calibration says");
     return image;

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 #include "stereo_rectification.hpp"
 

@@ -59,9 +59,9 @@ class StereoRectification {
 /// middle.
 StereoCamera withFieldOfView(StereoCamera camera, double fov);
 
-/// A calibration of two cameras: a camera chain of Kalibr's (cam0, cam1), or of the left and the right camera one
-/// camera_info YAML file each, or one sensor.yaml each (EuRoC). `fov` as above; 0 leaves camera_info's projection.
-/// Throws std::runtime_error that names the file and these formats.
-StereoRectification readCalibration(const std::vector<std::string>& files, double fov = 0.0);
+/// A calibration of two cameras in one of the formats of docs/tools.md. `fov` as above; 0 leaves the projection of a
+/// calibration that has one. `size`: of the images, for formats that lack it. Throws std::runtime_error that names the
+/// file and these formats.
+StereoRectification readCalibration(const std::vector<std::string>& files, double fov = 0.0, cv::Size size = {});
 
 }  // namespace sdvo

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "../common/whole_file.hpp"
+#include "file_kind.hpp"
 
 namespace sdvo {
 
@@ -33,6 +34,8 @@ inline std::ifstream openTextFile(const std::string& path) {
     throw std::runtime_error("cannot read file '" + path +
                              (std::filesystem::exists(path) ? "': no permission?" : "': it does not exist"));
   }
+  if (const std::string other = std::filesystem::is_regular_file(path) ? otherKindOf(path) : ""; !other.empty())
+    throw std::runtime_error("file '" + path + "' is " + other);
   return file;
 }
 
@@ -65,7 +68,7 @@ inline void writeTextFile(const std::string& path, const std::string& text) {
   }
   if (fs::is_regular_file(path) && !fs::is_empty(path)) {
     std::string before(std::min<std::uintmax_t>(fs::file_size(path), 65536), '\0');  // B; no first line is longer
-    openTextFile(path).read(before.data(), static_cast<std::streamsize>(before.size()));
+    std::ifstream(path).read(before.data(), static_cast<std::streamsize>(before.size()));
     if (kindOfText(before) != kindOfText(text))
       throw std::runtime_error("file '" + path + "' is of another kind and stays: give another name, or remove it");
   }
@@ -102,6 +105,7 @@ void readLines(const std::string& path, bool lines_count, const Read& read) {
   int number = 0, blank = 0;
   for (std::string line; std::getline(file, line);) {
     ++number;
+    if (number == 1 && line.rfind("\xef\xbb\xbf", 0) == 0) line.erase(0, 3);  // of Windows' editors
     while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
     if (line.empty()) blank = blank == 0 ? number : blank;
     const std::size_t first = line.find_first_not_of(" \t");

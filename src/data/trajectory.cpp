@@ -2,6 +2,7 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -73,19 +74,13 @@ double scaleOfSteps(const Trajectory& ground_truth, const Trajectory& estimate) 
 }
 
 /// Throws std::invalid_argument if the quaternion has not unit length.
-Eigen::Isometry3d poseOf(const std::vector<double>& position, const Eigen::Quaterniond& rotation) {
+Eigen::Isometry3d poseOf(const std::vector<double>& n, int w) {
+  const std::size_t x = w == 3 ? 4 : 3;
+  const Eigen::Quaterniond rotation(n[static_cast<std::size_t>(w)], n[x], n[x + 1], n[x + 2]);
   if (std::abs(rotation.norm() - 1.0) > kRotationTolerance)
     throw std::invalid_argument("the quaternion is not of unit length");
-  return Eigen::Translation3d(position[0], position[1], position[2]) * rotation.normalized();
+  return Eigen::Translation3d(n[0], n[1], n[2]) * rotation.normalized();
 }
-
-/// A format of poses in lines of numbers. `read` gets the numbers after the stamp, if there is one.
-struct PoseFormat {
-  const char* name;
-  std::size_t numbers;  ///< of a line, at least
-  std::int64_t (*stamp)(const std::string& word);
-  Eigen::Isometry3d (*read)(const std::vector<double>& numbers);
-};
 
 Eigen::Isometry3d poseFromTwelve(const std::vector<double>& n) {
   std::array<double, 12> rows;
@@ -93,60 +88,185 @@ Eigen::Isometry3d poseFromTwelve(const std::vector<double>& n) {
   return poseFromRows(rows);
 }
 
-const PoseFormat kKitti = {"KITTI's (12 numbers a line)", 12, nullptr, poseFromTwelve};
-const PoseFormat kStampedKitti = {"KITTI's behind a stamp in ns", 13, parseNanoseconds, poseFromTwelve};
-const PoseFormat kTum = {"TUM's (stamp in s, x y z, qx qy qz qw)", 8, parseSeconds, [](const std::vector<double>& n) {
-                           return poseOf(n, {n[6], n[3], n[4], n[5]});
-                         }};
-const PoseFormat kEuroc = {"EuRoC's (stamp in ns, x, y, z, qw, qx, qy, qz, …)", 8, parseNanoseconds,
-                           [](const std::vector<double>& n) {
-                             return poseOf(n, {n[3], n[4], n[5], n[6]});
-                           }};
+/// Of a body with x ahead, y to the right, z down, to the camera on it.
+Eigen::Isometry3d poseFromNed(const std::vector<double>& n) {
+  Eigen::Isometry3d T_body_camera = Eigen::Isometry3d::Identity();
+  T_body_camera.linear() << 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0;
+  return poseOf(n, 6) * T_body_camera;
+}
 
-/// The format that the first line of poses shows.
-const PoseFormat& formatOf(const std::string& line) {
-  const std::size_t numbers = splitWords(line).size();
-  if (line.find(',') < line.find_first_of(" \t") && std::count(line.begin(), line.end(), ',') >= 7) return kEuroc;
-  for (const PoseFormat* format : {&kKitti, &kStampedKitti, &kTum})
-    if (numbers == format->numbers) return *format;
-  throw std::invalid_argument(
-      text(0, numbers, " numbers: poses are ", kKitti.name, ", ", kTum.name, " or ", kEuroc.name));
+/// A format of poses in lines of numbers. `read` gets the numbers after the stamp, if there is one.
+struct PoseFormat {
+  const char* name;
+  std::size_t numbers;  ///< of a line, with the stamp
+  bool has_stamp;
+  Eigen::Isometry3d (*read)(const std::vector<double>& numbers);
+};
+
+const PoseFormat kKitti = {"KITTI's (12 numbers a line)", 12, false, poseFromTwelve};
+const PoseFormat kTum = {"TUM's (stamp, x y z, qx qy qz qw)", 8, true,
+                         [](const std::vector<double>& n) { return poseOf(n, 6); }};
+const PoseFormat kEuroc = {"EuRoC's (CSV: stamp in ns, x, y, z, qw, qx, qy, qz, …)", 8, true,
+                           [](const std::vector<double>& n) { return poseOf(n, 3); }};
+const PoseFormat kStampedKitti = {"KITTI's behind a stamp in ns", 13, true, poseFromTwelve};
+const PoseFormat kFormats[] = {kKitti,
+                               kStampedKitti,
+                               kTum,
+                               {"TartanAir's (x y z, qx qy qz qw)", 7, false, poseFromNed},
+                               kEuroc};
+
+/// A table of numbers with the names of its columns, if it has any.
+class PoseTable {
+ public:
+  explicit PoseTable(const std::string& line) {
+    is_csv_ = std::count(line.begin(), line.end(), ',') >= 6 || std::count(line.begin(), line.end(), ';') >= 6;
+  }
+
+  std::vector<std::string> wordsOf(std::string line) const {
+    if (is_csv_) std::replace_if(line.begin(), line.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
+    return splitWords(line);
+  }
+
+  /// From a head line, such as "timestamp [ns], p_x [m], …, q_w []" or "field.pose.position.x". Columns of a position
+  /// and a quaternion are found by the last letter of their names.
+  static std::vector<std::size_t> columnsOf(const std::string& head) {
+    std::vector<std::string> names(1);
+    for (const char c : head)
+      if (c == ',' || c == ';' || (head.find(',') == std::string::npos && std::isspace(static_cast<unsigned char>(c))))
+        names.emplace_back();
+      else
+        names.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    std::vector<std::size_t> columns = {0};
+    for (const char* wanted : {"px", "py", "pz", "qx", "qy", "qz", "qw"})
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        std::string name = names[i].substr(0, names[i].find('['));
+        name.erase(name.find_last_not_of(" \t\r") + 1);
+        const bool turns = name.find('q') != std::string::npos || name.find("orientation") != std::string::npos;
+        if (name.empty() || name.back() != wanted[1] || turns != (wanted[0] == 'q')) continue;
+        columns.push_back(i);
+        break;
+      }
+    return columns.size() == 8 ? columns : std::vector<std::size_t>();
+  }
+
+  const PoseFormat& formatOf(const std::vector<std::string>& words) const {
+    // Without a head, stamps in ns tell EuRoC's CSV from TUM's.
+    if (is_csv_ && words.size() >= 8 && words[0].find('.') == std::string::npos &&
+        (words.size() > 8 || words[0].size() > 15))
+      return kEuroc;
+    for (const PoseFormat& format : kFormats)
+      if (words.size() == format.numbers) return format;
+    std::string known;
+    for (const PoseFormat& format : kFormats) known += (known.empty() ? "" : ", ") + std::string(format.name);
+    throw std::invalid_argument(text(0, words.size(), " numbers: poses are ", known));
+  }
+
+ private:
+  bool is_csv_;
+};
+
+/// A unit of stamps, with its length in ns.
+struct StampUnit {
+  const char* name;
+  std::int64_t length;
+};
+
+/// As the head names it, or by the time of day that the first stamp is in or, of other clocks, by the usual interval:
+/// numbers that are thousands apart are no seconds.
+StampUnit unitOf(const std::vector<std::string>& stamps, const std::string& head) {
+  static const StampUnit units[] = {{"ns", 1}, {"us", 1000}, {"ms", 1000000}, {"s", 1000000000}};
+  for (const StampUnit& unit : units)
+    if (head.find(std::string("[") + unit.name + "]") < head.find(',')) return unit;
+  constexpr double kEarliest = 9e8, kLatest = 4e9;  // s, 1998 to 2096
+  const double first = parseNumber(stamps.front());
+  for (const StampUnit& unit : units) {
+    const double seconds = first * 1e-9 * static_cast<double>(unit.length);
+    if (seconds > kEarliest && seconds < kLatest) return unit;
+  }
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < stamps.size(); ++i)
+    intervals.push_back(std::abs(parseNumber(stamps[i]) - parseNumber(stamps[i - 1])));
+  constexpr double kMostSeconds = 1e3, kMostMicroseconds = 1e5;  // from pose to pose; the latter are ns beyond
+  const double interval = intervals.empty() ? 0.0 : median(intervals);
+  return units[interval < kMostSeconds ? 3 : interval < kMostMicroseconds ? 1 : 0];
+}
+
+std::int64_t parseStamp(const std::string& word, const StampUnit& unit) {
+  if (word.find('.') == std::string::npos && unit.length == 1) return parseNanoseconds(word);
+  const long double value = parseNumber<long double>(word) * static_cast<long double>(unit.length);
+  if (std::abs(value) > 9e18L) throw std::invalid_argument("'" + word + "' is out of range");
+  return std::llround(value);
 }
 
 /// `wanted`: the only format accepted; null: any.
 StampedTrajectory readPosesAs(const std::string& path, const PoseFormat* wanted) {
   StampedTrajectory trajectory;
   const PoseFormat* format = nullptr;
-  readLines(path, true, [&](std::string line) {
-    if (!format) {
-      format = &formatOf(line);
-      if (wanted && format != wanted)
-        throw std::invalid_argument("poses in " + std::string(format->name) + " format, expected " + wanted->name);
+  std::optional<PoseTable> table;
+  std::vector<std::size_t> columns;
+  std::vector<std::string> stamps;
+  int without_numbers = 0;
+  std::string head;  // the first line, if it names columns
+  std::getline(openTextFile(path), head);
+  head.erase(0, std::min(head.find_first_not_of("#% \xef\xbb\xbf"), head.size()));
+  if (head.empty() || !std::isalpha(static_cast<unsigned char>(head.front())) || head.rfind("nan", 0) == 0) head.clear();
+  const auto isNaN = [](const std::string& word) { return word == "nan" || word == "NaN" || word == "-nan"; };
+  readLines(path, true, [&](const std::string& line) {
+    if (!table && !head.empty() && line.find(head.substr(0, head.find_last_not_of(" \t\r") + 1)) != std::string::npos)
+      return;
+    if (!table) {
+      table.emplace(line);
+      columns = PoseTable::columnsOf(head);
     }
-    if (format == &kEuroc) std::replace(line.begin(), line.end(), ',', ' ');
-    const std::vector<std::string> words = splitWords(line);
+    std::vector<std::string> words = table->wordsOf(line);
+    if (!columns.empty() && words.size() > *std::max_element(columns.begin(), columns.end())) {
+      std::vector<std::string> ordered;
+      for (const std::size_t column : columns) ordered.push_back(words[column]);
+      words = std::move(ordered);
+      format = &kTum;
+    }
+    if (!format) format = &table->formatOf(words);
+    if (wanted && format->numbers != wanted->numbers)
+      throw std::invalid_argument("poses in " + std::string(format->name) + " format, expected " + wanted->name);
     if (words.size() < format->numbers || (words.size() > format->numbers && format != &kEuroc))
       throw std::invalid_argument(text(0, "expected ", format->numbers, " numbers, found ", words.size()));
-    if (format->stamp) {
-      const std::int64_t stamp = format->stamp(words.front());
-      if (!trajectory.stamps.empty() && stamp <= trajectory.stamps.back())
-        throw std::invalid_argument("stamp " + words.front() + " is not later than the one before");
-      trajectory.stamps.push_back(stamp);
+    words.resize(format->numbers);
+    if (format->has_stamp && std::any_of(words.begin() + 1, words.end(), isNaN)) {
+      ++without_numbers;
+      return;
     }
     std::vector<double> numbers;
-    std::transform(words.begin() + (format->stamp ? 1 : 0),
-                   words.begin() + static_cast<std::ptrdiff_t>(format->numbers), std::back_inserter(numbers),
+    std::transform(words.begin() + (format->has_stamp ? 1 : 0), words.end(), std::back_inserter(numbers),
                    parseNumber<double>);
     trajectory.poses.push_back(format->read(numbers));
+    if (!format->has_stamp) return;
+    if (!stamps.empty() && parseNumber<long double>(words[0]) <= parseNumber<long double>(stamps.back()))
+      throw std::invalid_argument("stamp " + words[0] + " is not later than the one before");
+    stamps.push_back(words[0]);
   });
-  if (!format) throw std::runtime_error("file '" + path + "' contains no poses");
+  if (trajectory.poses.empty()) throw std::runtime_error("file '" + path + "' contains no poses");
+  if (!stamps.empty()) {
+    const bool in_ns = format->name == kStampedKitti.name && stamps[0].find('.') == std::string::npos;
+    const StampUnit unit = in_ns ? StampUnit{"ns", 1} : unitOf(stamps, head);
+    try {
+      for (const std::string& stamp : stamps) trajectory.stamps.push_back(parseStamp(stamp, unit));
+    } catch (const std::invalid_argument& e) {
+      throw std::runtime_error("file '" + path + "': " + e.what());
+    }
+    if (unit.length != 1000000000 && !in_ns && format->name != kEuroc.name && head.find('[') == std::string::npos)
+      trajectory.remarks.push_back("stamps of '" + path + "' are in " + unit.name);
+  }
+  if (without_numbers > 0)
+    trajectory.remarks.push_back(text(0, without_numbers, " lines of '", path, "' have no numbers (NaN), left out"));
   return trajectory;
 }
 
 /// Poses further apart than this (ns) are not interpolated: the motion between them may be anything.
 constexpr std::int64_t kLongestGap = 500000000;
 
-std::optional<Eigen::Isometry3d> interpolated(const StampedTrajectory& truth, std::int64_t stamp) {
+}  // namespace
+
+std::optional<Eigen::Isometry3d> poseAt(const StampedTrajectory& truth, std::int64_t stamp) {
   const auto next = std::lower_bound(truth.stamps.begin(), truth.stamps.end(), stamp);
   if (next == truth.stamps.end()) return std::nullopt;
   const auto after = static_cast<std::size_t>(std::distance(truth.stamps.begin(), next));
@@ -160,8 +280,6 @@ std::optional<Eigen::Isometry3d> interpolated(const StampedTrajectory& truth, st
   pose.translation() = (1.0 - part) * from.translation() + part * to.translation();
   return pose;
 }
-
-}  // namespace
 
 Eigen::Isometry3d poseFromRows(const std::array<double, 12>& rows) {
   const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(rows.data());
@@ -301,39 +419,25 @@ TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajec
 }
 
 std::vector<std::optional<Eigen::Isometry3d>> readGroundTruth(const std::string& path,
-                                                              const std::vector<std::int64_t>& stamps) {
+                                                              const std::vector<std::int64_t>& stamps,
+                                                              const std::vector<std::size_t>& numbers,
+                                                              std::size_t first) {
   const StampedTrajectory truth = readPoses(path);
-  if (truth.stamps.empty()) {
-    if (truth.poses.size() < stamps.size())
-      throw std::runtime_error(text(0, "file '", path, "' has ", truth.poses.size(), " poses for ", stamps.size(),
-                                    " pairs: one line for each is needed, or stamps as in ", kTum.name, " format"));
-    return {truth.poses.begin(), truth.poses.begin() + static_cast<std::ptrdiff_t>(stamps.size())};
-  }
   std::vector<std::optional<Eigen::Isometry3d>> poses;
-  for (const std::int64_t stamp : stamps) poses.push_back(interpolated(truth, stamp));
+  if (truth.stamps.empty()) {
+    const std::size_t lines = numbers.empty() ? 0 : numbers.back() + 1;
+    const std::size_t before = truth.poses.size() >= first + lines ? first : 0;
+    if (truth.poses.size() < lines)
+      throw std::runtime_error(text(0, "file '", path, "' has ", truth.poses.size(), " poses for ", lines,
+                                    " left images: one line for each is needed, or stamps as in ", kTum.name,
+                                    " format"));
+    for (const std::size_t number : numbers) poses.emplace_back(truth.poses[before + number]);
+    return poses;
+  }
+  for (const std::int64_t stamp : stamps) poses.push_back(poseAt(truth, stamp));
   if (std::count_if(poses.begin(), poses.end(), [](const auto& pose) { return pose.has_value(); }) < 2)
     throw std::runtime_error("file '" + path + "' has no poses at the stamps of the recording");
   return poses;
-}
-
-std::pair<Trajectory, Trajectory> readComparable(const std::string& ground_truth, const std::string& estimate) {
-  const StampedTrajectory truth = readPoses(ground_truth), estimated = readPoses(estimate);
-  if (truth.stamps.empty() || estimated.stamps.empty()) {
-    // Without stamps in both files poses correspond by their lines.
-    if (truth.stamps.empty() != estimated.stamps.empty() && truth.poses.size() != estimated.poses.size())
-      throw std::runtime_error(
-          text(0, "'", ground_truth, "' has ", truth.poses.size(), " poses, '", estimate, "' ", estimated.poses.size(),
-               ", and one of both has no stamps: run_sequence writes either by --format kitti or tum"));
-    return {truth.poses, estimated.poses};
-  }
-  std::pair<Trajectory, Trajectory> both;
-  const auto truths = readGroundTruth(ground_truth, estimated.stamps);
-  for (std::size_t i = 0; i < truths.size(); ++i) {
-    if (!truths[i]) continue;
-    both.first.push_back(*truths[i]);
-    both.second.push_back(estimated.poses[i]);
-  }
-  return both;
 }
 
 }  // namespace sdvo

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "../common/text.hpp"
+#include "frames.hpp"
 
 namespace sdvo::ros_conversions {
 namespace {
@@ -67,6 +68,27 @@ std::string remedy(const View& left, const View& right) {
   return "P[3] of the right camera_info has the wrong sign, it must be -fx * baseline";
 }
 
+/// Distance to the right camera by TF, m; 0 with the problem: TF does not have it.
+double baselineOnTf(const CameraInfo& left, const CameraInfo& right, const FindTransform& find, std::string& problem) {
+  const std::string from = cleanFrameId(left.header.frame_id), to = cleanFrameId(right.header.frame_id);
+  if (!find || from.empty() || to.empty() || from == to) {
+    problem = find ? ", and both camera_info name the frame '" + from + "', where TF could have the right camera's" : "";
+    return 0.0;
+  }
+  const auto T_left_right = find(from, to, problem);
+  if (!T_left_right) {
+    problem = ", and TF does not have '" + to + "' in '" + from + "': " + problem;
+    return 0.0;
+  }
+  constexpr double kAside = 0.02, kTurned = 0.01;  // of the baseline; rad: a rectified pair is side by side
+  const Eigen::Vector3d t = T_left_right->translation();
+  if (t.x() > 0.0 && t.tail<2>().norm() < kAside * t.x() && Eigen::AngleAxisd(T_left_right->linear()).angle() < kTurned)
+    return t.x();
+  problem = text(3, ", and TF has '", to, "' at ", t.x(), " ", t.y(), " ", t.z(), " m in '", from,
+                 "': optical frames of a rectified pair are equal but for x (to the right)");
+  return 0.0;
+}
+
 /// Angle of the rectification's rotation, rad; 0 without R.
 double rotation(const CameraInfo& info) {
   using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
@@ -76,7 +98,7 @@ double rotation(const CameraInfo& info) {
 
 }  // namespace
 
-StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right_info) {
+StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right_info, const FindTransform& find) {
   const View left = viewOf(left_info, "left"), right = viewOf(right_info, "right");
   const auto both = [&] { return " (left " + describeP(left_info) + "; right " + describeP(right_info) + ")"; };
   if (left.width != right.width || left.height != right.height)
@@ -93,7 +115,10 @@ StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right
     throw std::invalid_argument("left and right camera_info have different principal points" + both() +
                                 ", rectify with zero disparity at infinity, and cut the same region out of both");
   // The left P may have a Tx of its own (KITTI's colour pair), so that the baseline is a difference.
-  const double baseline = left.tx - right.tx, vertical = left.ty - right.ty;
+  const double vertical = left.ty - right.ty;
+  double baseline = left.tx - right.tx;
+  std::string on_tf;
+  if (left.tx == 0.0 && right.tx == 0.0 && vertical == 0.0) baseline = baselineOnTf(left_info, right_info, find, on_tf);
   if (std::abs(vertical) > std::abs(baseline))
     throw std::invalid_argument(
         text(6, "the baseline of ", std::abs(vertical), " m is vertical (P[7])") + both() +
@@ -102,7 +127,7 @@ StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right
         (vertical > 0.0 ? "left" : "right") + " one, is the left one then: docs/cameras.md, 'A vertical pair'");
   if (!(baseline > 0.0))
     throw std::invalid_argument(text(6, "baseline = ", baseline, " m is not positive") + both() + ": " +
-                                remedy(left, right));
+                                remedy(left, right) + on_tf);
   const StereoCamera camera{left.fx, left.fy, left.cx, left.cy, baseline, left.width, left.height};
   camera.check();
   return camera;

@@ -103,6 +103,10 @@ cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message, const GreyRange& range
                                                                           {encodings::BGRA8, cv::COLOR_BGRA2GRAY},
                                                                           {encodings::RGBA8, cv::COLOR_RGBA2GRAY},
                                                                           {encodings::YUV422, cv::COLOR_YUV2GRAY_UYVY}};
+  if (message->encoding.rfind(kUndecoded, 0) == 0)
+    throw std::invalid_argument("a compressed image of format '" + message->encoding.substr(kUndecoded.size()) +
+                                "' cannot be decoded: JPEG, PNG and WebP can, unless they are torn. Republish others as "
+                                "raw images (image_transport republish); depth images are no camera's");
   const auto colour = colours.find(message->encoding);
   if (colour == colours.end())
     throw std::invalid_argument("encoding '" + message->encoding +

@@ -5,6 +5,7 @@
 #include <array>
 #include <deque>
 #include <opencv2/core.hpp>
+#include <string>
 
 namespace sdvo::ros_conversions {
 
@@ -12,6 +13,9 @@ namespace sdvo::ros_conversions {
 struct GreyRange {
   double black = 0.0, white = 65535.0;
 };
+
+/// Begin of the encoding of a compressed image that could not be decoded; its format follows.
+inline const std::string kUndecoded = "undecoded ";
 
 /// CV_8U grey pixels of mono8, 8UC1, mono16, bgr8, rgb8, bgra8, rgba8 and yuv422. The result may share the message's
 /// memory: the message must outlive it. `range`: for mono16 only. Throws std::invalid_argument for any other encoding

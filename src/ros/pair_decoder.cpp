@@ -3,7 +3,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../messages/camera_conversions.hpp"
 
 namespace sdvo {
 namespace {
@@ -16,8 +15,19 @@ cv::Mat greyOf(const char* side, const sensor_msgs::ImageConstPtr& image, const 
 
 }  // namespace
 
+/// The first transform that is found is kept: rounding on TF would make a new camera of each pair.
+PairDecoder::PairDecoder(ros_conversions::FindTransform find) {
+  if (!find) return;
+  find_ = [find = std::move(find), parts = std::string(), found = std::optional<Eigen::Isometry3d>()](
+              const std::string& parent, const std::string& child, std::string& problem) mutable {
+    if (std::exchange(parts, parent + " " + child) != parts) found.reset();
+    if (!found) found = find(parent, child, problem);
+    return found;
+  };
+}
+
 DecodedPair PairDecoder::decode(const StereoPairMessages& pair) {
-  const StereoCamera camera = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
+  const StereoCamera camera = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info, find_);
   const bool new_range = grey_.add(*pair.left_image, *pair.right_image);
   return {camera, greyOf("left", pair.left_image, grey_.range()), greyOf("right", pair.right_image, grey_.range()),
           new_range};

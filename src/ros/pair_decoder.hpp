@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "../messages/camera_conversions.hpp"
 #include "../messages/image_conversions.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_input.hpp"
@@ -21,6 +22,9 @@ struct DecodedPair {
 /// one for each focus of the lens. The mapping of mono16 to grey levels stays from pair to pair.
 class PairDecoder {
  public:
+  /// `find`: of TF, for a baseline that P does not have.
+  explicit PairDecoder(ros_conversions::FindTransform find = {});
+
   /// Throws std::invalid_argument as toStereoCamera() and toGrey() do.
   DecodedPair decode(const StereoPairMessages& pair);
 
@@ -32,6 +36,7 @@ class PairDecoder {
   const ros_conversions::GreyRange& greyRange() const { return grey_.range(); }
 
  private:
+  ros_conversions::FindTransform find_;
   std::optional<StereoCamera> camera_;
   ros_conversions::GreyRangeTracker grey_;
 };

@@ -10,6 +10,7 @@
 
 #include "../check/calibration_check.hpp"
 #include "../check/image_check.hpp"
+#include "../check/mosaic_check.hpp"
 #include "../common/stamp_filter.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
@@ -25,6 +26,7 @@
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_input.hpp"
 #include "throttles.hpp"
+#include "transforms.hpp"
 
 namespace sdvo {
 namespace {
@@ -202,6 +204,11 @@ class StereoFeaturesNodelet : public RobotNodelet {
     repeats_.add(decoded.left, decoded.right, nanoseconds(stamp));
     if (!repeats_.problem().empty() && (features.report.refused || features.report.status.empty()))
       features.report.status = repeats_.problem();
+    mosaic_.add(decoded.left, decoded.right);
+    if (const std::string problem = mosaic_.problem(); !problem.empty()) {
+      if (!std::exchange(mosaic_found_, true)) warnOf("mosaic", mosaic_.judge());
+      features.report.status = problem;
+    }
 
     diagnostics_->note(features);
     reportRig(features, stamp);
@@ -270,11 +277,19 @@ class StereoFeaturesNodelet : public RobotNodelet {
 
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
-  PairDecoder decoder_;
+  std::unique_ptr<RobotTransforms> transforms_;  // once P lacks a baseline
+  PairDecoder decoder_{[this](const std::string& parent, const std::string& child, std::string& problem) {
+    if (!transforms_)
+      transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, TransformPublisher::tagOf(getName()),
+                                                      [this](const std::string& why) { NODELET_WARN_STREAM(why); });
+    return transforms_->find(parent, child, problem);
+  }};
   ExtractionReport last_report_;
   RepeatCheck repeats_;
   cv::Mat mask_;  // of the topic; empty: none has come
   EmitterCheck emitter_;
+  MosaicCheck mosaic_;
+  bool mosaic_found_ = false;
   int clock_steps_ = 0;
   std::uint32_t stream_epoch_ = 0;
   bool rig_is_wrong_ = false;  // as reported last

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "../check/axes_check.hpp"
+#include "../check/mount_check.hpp"
 #include "../common/imu_tracks.hpp"
 #include "../common/stamp_filter.hpp"
 #include "../common/text.hpp"
@@ -299,6 +300,9 @@ class VisualOdometryNodelet : public RobotNodelet {
     };
     if (!base_is_camera_) optical_axis_.add(*mount_->last(), result.T_previous_current);
     warnOnce("axes", optical_found_, optical_axis_.judge(), "");
+    mount_check_.add(*mount_->last(), result.T_previous_current);
+    if (const PlanarOptions& floor = odometry_->options().planar; floor.planar && !mount_found_.isFault())
+      warnOnce("mount", mount_found_, mount_check_.judge(floor.planar_tilt_sigma), "");
     constexpr double kSame = 1e-3;  // s: after an outage the motion is of another time than the guess
     if (!guess || !guess->rotation_only ||
         std::abs(secondsBetween(*processed_stamp_, header.stamp) - result.dt) > kSame)
@@ -359,7 +363,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     mount_->forget();
     optical_axis_ = {};
     gyro_axes_ = {};
-    optical_found_ = gyro_found_ = {};
+    mount_check_ = {};
+    optical_found_ = gyro_found_ = mount_found_ = {};
     publisher_->restart(T_odom_start);
     given_start_ = given.has_value();
     levels_until_.reset();
@@ -551,7 +556,8 @@ class VisualOdometryNodelet : public RobotNodelet {
   Patience patience_{0.0};              // with guesses
   OpticalAxisCheck optical_axis_;
   GyroAxesCheck gyro_axes_;
-  Finding optical_found_{}, gyro_found_{};  // as reported last
+  MountCheck mount_check_;
+  Finding optical_found_{}, gyro_found_{}, mount_found_{};  // as reported last
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
   std::unique_ptr<PausableInput> input_;

@@ -28,11 +28,14 @@ void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) 
     rows_.add(*corners);
     lens_check_.add(pair.camera, *corners);
   }
+  mosaic_.add(pair.left, pair.right);
   repeats_.add(pair.left, pair.right, pair.stamp);
   focus_.add(pair.left, pair.right);
   images_.add(pair.left, pair.right, features.report);
   emitter_.add(pair.left);
   odometry_.add(features, run_.last());
+  if (run_.last().state == TrackingState::kTracking && run_.last().has_motion)
+    motions_.push_back(run_.last().T_previous_current);
   cv::hconcat(pair.left, pair.right, picture_);
 }
 
@@ -48,6 +51,7 @@ std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const
       {"stamps", arrivals.stamps},
       {"calibration", calibration()},
       {"exposure", images_.exposure(thresholds_.min_intensity, thresholds_.max_intensity)},
+      {"mosaic", mosaic_.judge()},
       {"repeats", repeats_.judge()},
       {"focus", focus_.judge()},
       {"same moment", rows_.sameMoment()},
@@ -65,7 +69,8 @@ std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const
                                   [](const CheckStep& step) { return step.finding.verdict == Verdict::kFail; });
   for (auto later = fault; later != steps.end(); ++later)
     if (later != fault) later->finding = {Verdict::kOpen, "not judged: mend '" + fault->name + "' first"};
-  steps.push_back({"TF", arrivals.transform});  // which no other step needs
+  steps.push_back({"TF", arrivals.transform});  // which only the last step needs
+  steps.push_back({"mount", mount(arrivals.T_base_camera)});
   return steps;
 }
 
@@ -85,6 +90,17 @@ cv::Mat CameraCheck::picture() const {
     cv::line(drawn, {0, row}, {drawn.cols - 1, row}, {0, 200, 255});
   }
   return drawn;
+}
+
+/// A fault only of a base that is said to drive on a floor: a hand or a rotor tilts others.
+Finding CameraCheck::mount(const std::optional<Eigen::Isometry3d>& T_base_camera) const {
+  if (!T_base_camera) return {Verdict::kOpen, "no mount is known"};
+  MountCheck check;
+  for (const Eigen::Isometry3d& motion : motions_) check.add(*T_base_camera, motion);
+  const PlanarOptions& floor = options_.visual_odometry.planar;
+  const Finding finding = check.judge(floor.planar_tilt_sigma);
+  if (floor.planar || !finding.isFault()) return finding;
+  return {Verdict::kOk, finding.what + ", which counts if it drives on a floor (planar)"};
 }
 
 Finding CameraCheck::rig() const {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +11,8 @@
 #include "../check/focus_check.hpp"
 #include "../check/image_check.hpp"
 #include "../check/lens_check.hpp"
+#include "../check/mosaic_check.hpp"
+#include "../check/mount_check.hpp"
 #include "../check/odometry_check.hpp"
 #include "../check/row_check.hpp"
 #include "../config/pipeline_options.hpp"
@@ -39,6 +43,7 @@ class CameraCheck {
  private:
   Finding calibration() const;
   Finding rig() const;
+  Finding mount(const std::optional<Eigen::Isometry3d>& T_base_camera) const;
   Finding load(double rate) const;
 
   const PipelineOptions options_;
@@ -47,11 +52,13 @@ class CameraCheck {
   CornerPairs corner_pairs_;
   RowCheck rows_;
   LensCheck lens_check_;
+  MosaicCheck mosaic_;
   RepeatCheck repeats_;
   FocusCheck focus_;
   ImageCheck images_;
   EmitterCheck emitter_;
   OdometryCheck odometry_;
+  std::vector<Eigen::Isometry3d> motions_;  ///< T_before_now of pairs that are TRACKING
   int used_ = 0, unusable_ = 0, refused_ = 0;
   std::string problem_, refusal_, lens_, unrectified_;
   StereoCamera camera_;

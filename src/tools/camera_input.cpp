@@ -76,8 +76,11 @@ void CameraInput::add(const StereoMessage& message) {
   const auto input = static_cast<ArrivalLog::Input>(message.input);
   newest_ = message.arrival;
   arrivals_.note(input, nanoseconds(stamp), newest_.toSec());
-  if (input == ArrivalLog::kLeftImage) frame_ = message.header.frame_id;
-  lefts_ += input == ArrivalLog::kLeftImage;
+  if (input == ArrivalLog::kLeftImage) {
+    ++lefts_;
+    frame_ = message.header.frame_id;
+    left_stamps_.insert(nanoseconds(stamp));
+  }
   if (const std::string why = whyUnusable(stamp); !why.empty()) {
     ++unusable_;
     problem_ = topics_[input] + ": " + why;
@@ -119,6 +122,14 @@ void CameraInput::add(const rosbag::MessageInstance& instance) {
   } catch (const std::runtime_error& e) {
     tf_problem_ = e.what();
   }
+}
+
+std::optional<Eigen::Isometry3d> CameraInput::find(const std::string& parent, const std::string& child,
+                                                   std::string& problem) const try {
+  return tf2::transformToEigen(transforms_.lookupTransform(parent, child, ros::Time(0)));
+} catch (const tf2::TransformException& e) {
+  problem = e.what();
+  return std::nullopt;
 }
 
 std::string CameraInput::baseAbove(std::string frame) const {

@@ -50,6 +50,12 @@ class CameraInput {
   /// above the camera on TF that is the child frame of an odometry in the bag, else for base_link.
   ArrivalFindings findings(const std::string& base_frame, bool is_recorded);
 
+  /// T_parent_child on TF; none, with the problem. For any thread.
+  std::optional<Eigen::Isometry3d> find(const std::string& parent, const std::string& child, std::string& problem) const;
+
+  /// Of all left images so far.
+  const std::set<std::int64_t>& leftStamps() const { return left_stamps_; }
+
   /// Number of stamps without a pair, with those that still wait.
   int unused() const;
   /// Why there is no pair: what is wrong with the last unusable message, else how the stamps differ.
@@ -78,6 +84,7 @@ class CameraInput {
   tf2::BufferCore transforms_;
   bool has_transforms_ = false;
   std::optional<std::string> frame_;  ///< of the left images
+  std::set<std::int64_t> left_stamps_;
   std::set<std::string> bases_;       ///< child frames of odometries
 };
 

@@ -102,7 +102,11 @@ int check(const Arguments& arguments) {
     return report(arguments.bag, recording->arrivals(arguments.base_frame));
   }
   const StereoTopics topics = source.topics();
-  PairReader reader(topics, source.fov);
+  const CameraInput* known = nullptr;  // set before the first pair
+  PairReader reader(topics, source.fov,
+                    [&](const std::string& parent, const std::string& child, std::string& problem) {
+                      return known->find(parent, child, problem);
+                    });
   std::int64_t last_stamp = 0;  // ns
   constexpr std::size_t kWaitingPairs = 100;
   Worker<ArrivedPair> worker(kWaitingPairs, [&](const ArrivedPair& pair) {
@@ -117,6 +121,7 @@ int check(const Arguments& arguments) {
     }
   });
   CameraInput input(topics, infosOf(source), source.pairing, [&](const ArrivedPair& pair) { worker.push(pair); });
+  known = &input;
   listen(arguments, topics, input);
   worker.stop();
   ArrivalFindings findings = input.findings(arguments.base_frame, false);

@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "../common/progress.hpp"
+#include "../common/text.hpp"
 #include "../data/euroc_dataset.hpp"
 #include "../ros/output_files.hpp"
 #include "pair_reader.hpp"
@@ -206,28 +207,25 @@ struct Arguments {
   int frames = std::numeric_limits<int>::max();
 };
 
-/// True poses of the rectified left camera in each frame; empty, with a note, where they are not known.
-Trajectory groundTruth(const Arguments& arguments, std::size_t frames) {
+/// True poses of the rectified left camera at each stamp; empty, with a note, where they are not known.
+Trajectory groundTruth(const Arguments& arguments, const Recording& recording, const std::vector<std::int64_t>& stamps) {
   const auto mav0 = findMav0(arguments.input);
-  const std::optional<std::string> path =
-      arguments.poses.empty() && !mav0 ? findKittiPoses(arguments.input) : arguments.poses;
   Trajectory poses;
   std::string problem;
-  if (mav0 && arguments.poses.empty())
+  if (mav0 && arguments.poses.empty()) {
     poses = EurocSequence(*mav0, arguments.source.calibration, arguments.source.fov).rectifiedPoses(problem);
-  else if (path)
-    poses = readKittiPoses(*path);
-  else
+    poses.resize(std::min(poses.size(), stamps.size()));
+  } else if (const auto path = arguments.poses.empty() ? findKittiPoses(arguments.input) : arguments.poses) {
+    for (const auto& pose : recording.truth(*path, stamps))
+      if (pose) poses.push_back(*pose);
+    if (poses.size() < stamps.size())
+      problem = text(0, "'", *path, "' has poses for ", poses.size(), " of ", stamps.size(), " pairs alone");
+  } else {
     problem = "no poses file beside '" + arguments.input + "' and no --poses";
-  if (!problem.empty()) {
-    std::cerr << "note: " << problem << ", so there is no ground truth" << std::endl;
-    return {};
   }
-  if (poses.size() < frames)
-    throw std::runtime_error("file '" + *path + "' has " + std::to_string(poses.size()) + " poses for " +
-                             std::to_string(frames) + " frames: does it belong to this sequence?");
-  poses.resize(frames);
-  return poses;
+  if (problem.empty()) return poses;
+  std::cerr << "note: " << problem << ", so there is no ground truth" << std::endl;
+  return {};
 }
 
 /// A bag of the images as a folder has them. `geometry`: of the rectified images or what rectifies raw ones.
@@ -237,9 +235,13 @@ void writeBag(const Arguments& arguments, const Sequence& sequence, const Geomet
   const auto left = toCameraInfo(geometry, 0), right = toCameraInfo(geometry, 1);
   const int frames = std::min(arguments.frames, sequence.size());
   std::vector<ros::Time> stamps;
-  for (int i = 0; i < frames; ++i)
+  std::vector<std::int64_t> of_sequence;
+  for (int i = 0; i < frames; ++i) {
+    of_sequence.push_back(sequence.stamp(i));
     stamps.push_back(ros::Time().fromNSec(static_cast<std::uint64_t>(epoch + sequence.stamp(i))));
-  StereoBag bag(arguments.output, stamps, rectified, groundTruth(arguments, stamps.size()));
+  }
+  const auto recording = openRecording({arguments.input}, arguments.source);
+  StereoBag bag(arguments.output, stamps, rectified, groundTruth(arguments, *recording, of_sequence));
   Progress progress("writing bag", frames);
   for (int i = 0; i < frames; ++i, progress.step())
     bag.write(static_cast<std::size_t>(i), topic, sequence.load(i), left, right);
@@ -253,8 +255,13 @@ void writeBag(const Arguments& arguments) {
       std::cerr << "note: " << sequence.unpaired() << " image(s) without a partner are left out" << std::endl;
     return writeBag(arguments, sequence, sequence.rectification(), sequence.rectification().camera(), 0, "image_raw");
   }
-  const KittiSequence sequence(arguments.input);
-  writeBag(arguments, sequence, sequence.camera(), sequence.camera(), kEpoch, "image_rect");
+  const StereoSource& source = arguments.source;
+  const KittiSequence sequence(arguments.input, KittiCameras::kAny, {source.calibration, source.fov, source.rate});
+  const std::int64_t epoch = sequence.stamp(0) < kEpoch ? kEpoch : 0;  // KITTI raw has the time of day
+  if (const StereoRectification* raw = sequence.rectification())
+    writeBag(arguments, sequence, *raw, sequence.camera(), epoch, "image_raw");
+  else
+    writeBag(arguments, sequence, sequence.camera(), sequence.camera(), epoch, "image_rect");
 }
 
 /// A folder in KITTI's layout, of rectified images.
@@ -278,7 +285,7 @@ void writeFolder(const Arguments& arguments) {
     });
   }
   if (left_out > 0) std::cerr << "note: " << left_out << " stamp(s) without a usable pair are left out" << std::endl;
-  const Trajectory poses = groundTruth(arguments, stamps.size());
+  const Trajectory poses = groundTruth(arguments, *recording, stamps);
   const std::int64_t first = stamps.front();
   for (std::int64_t& stamp : stamps) stamp -= first;
   output.finish(camera, stamps, poses);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../data/text_file.hpp"
+#include "../data/trajectory_comparison.hpp"
 #include "run_tool.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
@@ -74,15 +75,25 @@ std::string jsonNumber(double value) {
   return std::isfinite(value) ? format("%.12g", value) : "null";
 }
 
+/// As a string of JSON.
+std::string quoted(const std::string& text) {
+  std::string quoted;
+  for (const char c : text) quoted += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+  return quoted;
+}
+
 std::string jsonSubPaths(const SubPathErrors& errors) {
   return "\"sub_paths\": " + std::to_string(errors.count) +
          ", \"translation_percent\": " + jsonNumber(errors.translation_percent) +
          ", \"rotation_deg_per_m\": " + jsonNumber(errors.rotation_deg_per_m);
 }
 
-void writeJson(const std::string& path, const TrajectoryErrors& errors) {
+void writeJson(const std::string& path, const TrajectoryErrors& errors, const std::vector<std::string>& differences) {
   std::ostringstream file;
-  file << "{ \"frames\": " << errors.frames << ",\n  \"path_length_m\": " << jsonNumber(errors.path_length)
+  file << "{ \"differences\": [";
+  for (const std::string& difference : differences)
+    file << (&difference == &differences.front() ? "" : ", ") << '"' << quoted(difference) << '"';
+  file << "],\n  \"frames\": " << errors.frames << ",\n  \"path_length_m\": " << jsonNumber(errors.path_length)
        << ",\n  \"mean\": {" << jsonSubPaths(errors.sub_paths) << "},\n  \"per_length\": [";
   const char* separator = "\n";
   for (const SubPathErrors& row : errors.per_length) {
@@ -101,23 +112,32 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Errors of an estimated trajectory: KITTI translation and rotation errors over sub-paths, RPE, ATE, final drift "
       "and scale. Poses of both files belong together by their stamps; without stamps by their lines, and a shorter "
-      "estimate is compared with the first poses of the ground truth.");
-  std::string ground_truth, estimate, json;
+      "estimate is compared with the first poses of the ground truth. Says first how the files differ: units and "
+      "clocks of stamps, shifted lines, bodies (a marker, an IMU) and worlds.");
+  std::string ground_truth, estimate, json, offset;
+  sdvo::ComparisonOptions options;
   std::vector<double> lengths = sdvo::kittiLengths();
   app.add_option("--ground-truth", ground_truth,
-                 "True poses: KITTI's format (12 numbers a line), TUM's, or EuRoC's CSV")
+                 "True poses: KITTI's format (12 numbers a line), TUM's, EuRoC's or another CSV with a head, TartanAir's")
       ->required();
   app.add_option("--estimate", estimate, "Estimated poses in one of these formats")->required();
   app.add_option("--lengths", lengths, "Lengths of the sub-paths in m, e.g. 5,10,20 (default 100,200,...,800)")
       ->delimiter(',');
+  app.add_flag("--align", options.align, "Moves the estimate to the truth's body, by the constant transform that is said");
+  app.add_option("--offset", offset,
+                 "Added to the estimate's stamps, s, or auto: the shift in time, or of lines, that is said");
   app.add_option("--json", json, "Also write the errors to this file");
 
   return sdvo::runTool(app, argc, argv, [&] {
-    const auto [truth, estimated] = sdvo::readComparable(ground_truth, estimate);
+    options.find_offset = offset == "auto";
+    if (!offset.empty() && !options.find_offset) options.offset = sdvo::parseNumber(offset);
+    const auto [truth, estimated, differences] = sdvo::compareTrajectories(ground_truth, estimate, options);
+    for (const std::string& difference : differences) std::printf("differs: %s\n", difference.c_str());
+    if (!differences.empty()) std::printf("\n");
     const TrajectoryErrors errors = sdvo::evaluateTrajectory(truth, estimated, lengths);
     printTable(errors);
     std::fflush(stdout);
-    if (!json.empty()) writeJson(json, errors);
+    if (!json.empty()) writeJson(json, errors, differences);
     const std::string missing = missingLengths(errors);
     if (errors.sub_paths.count == 0) {
       throw std::runtime_error("no sub-path of " + missing + " m fits into the " + format("%.2f", errors.path_length) +

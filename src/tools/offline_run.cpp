@@ -59,6 +59,8 @@ void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, 
                                 : frames_.empty() ? ExtractionReport()
                                                   : frames_.back().extraction;
   Extracted pair{extractor_.extract(camera, left, right, stamp, cv::Mat(), last), 0.0};
+  mosaic_.add(left, right);
+  if (!mosaic().empty()) pair.features.report.status = mosaic();
   if (odometry.valid()) odometry.get();
   pair.features.right_delay = right_delay;
   pair.time = stopwatch.lap();

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "../check/mosaic_check.hpp"
 #include "../config/pipeline_options.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
@@ -53,6 +54,9 @@ class OfflineRun {
   double time(double quantile) const;
   double cpuTime() const;  ///< mean of all threads
 
+  /// Whether images are a mosaic, in words; empty: they are not.
+  std::string mosaic() const { return mosaic_.problem(); }
+
   /// Poses of the left camera, one for each pair: without one of its own a pair repeats the last one.
   Trajectory poses() const;
   /// The poses there are, with their stamps.
@@ -72,6 +76,7 @@ class OfflineRun {
   void track(const Extracted& pair);
 
   FeatureExtractor extractor_;
+  MosaicCheck mosaic_;
   VisualOdometry odometry_;
   std::optional<Extracted> waiting_;  ///< for its odometry
   std::vector<Frame> frames_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "../messages/camera_conversions.hpp"
 
@@ -70,14 +71,14 @@ CameraInfo toCameraInfo(const StereoRectification& rectification, int side) {
   return message;
 }
 
-std::optional<StereoInfos> infosOf(const StereoSource& source) {
+std::optional<StereoInfos> infosOf(const StereoSource& source, cv::Size images) {
   if (source.calibration.empty()) return std::nullopt;
-  const StereoRectification rectification = readCalibration(source.calibration, source.fov);
+  const StereoRectification rectification = readCalibration(source.calibration, source.fov, images);
   return StereoInfos{toCameraInfo(rectification, 0), toCameraInfo(rectification, 1)};
 }
 
-PairReader::PairReader(const StereoTopics& topics, double fov)
-    : may_be_raw_(topics[0].find("rect", topics[0].rfind("/image") + 1) == std::string::npos), fov_(fov) {}
+PairReader::PairReader(const StereoTopics& topics, double fov, ros_conversions::FindTransform find)
+    : may_be_raw_(topics[0].find("rect", topics[0].rfind("/image") + 1) == std::string::npos), fov_(fov), decoder_(std::move(find)) {}
 
 RecordedPair PairReader::read(const StereoPairMessages& pair, std::int64_t stamp) {
   const DecodedPair decoded = decoder_.decode(pair);

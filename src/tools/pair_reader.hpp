@@ -21,14 +21,16 @@ sensor_msgs::CameraInfo toCameraInfo(const StereoRectification& rectification, i
 
 using StereoInfos = std::array<sensor_msgs::CameraInfo, 2>;
 
-/// From the files that stand for camera_info messages; none without such files.
-std::optional<StereoInfos> infosOf(const StereoSource& source);
+/// From the files that stand for camera_info messages; none without such files. `images`: their size, which some formats
+/// lack.
+std::optional<StereoInfos> infosOf(const StereoSource& source, cv::Size images = {});
 
 /// Turns the messages of one camera's pairs into rectified pairs. Images without "rect" in their topic's name are raw,
 /// unless their camera_info has neither distortion nor rotation: they are rectified as by image_proc.
 class PairReader {
  public:
-  PairReader(const StereoTopics& topics, double fov);
+  /// `find`: of TF, for a baseline that camera_info does not have.
+  PairReader(const StereoTopics& topics, double fov, ros_conversions::FindTransform find = {});
 
   /// Throws std::invalid_argument where calibration or images cannot be used.
   RecordedPair read(const StereoPairMessages& pair, std::int64_t stamp);

@@ -41,8 +41,7 @@ class FolderRecording : public Recording {
   int forEach(int limit, const Use& use, const Refuse&) override {
     used_ = std::min(limit, size());
     for (int i = 0; i < used_; ++i) give(i, sequence_.stamp(i), use);
-    if constexpr (kIsEuroc) return sequence_.unpaired();
-    return 0;
+    return sequence_.unpaired();
   }
 
   void forEachBackwards(const Use& use) const override {
@@ -52,7 +51,7 @@ class FolderRecording : public Recording {
 
   std::vector<std::optional<Eigen::Isometry3d>> truth(const std::string& path,
                                                       const std::vector<std::int64_t>& stamps) const override {
-    auto poses = readGroundTruth(path, stamps);
+    auto poses = Recording::truth(path, stamps);
     if constexpr (kIsEuroc)
       for (auto& pose : poses)
         if (pose && fs::path(path).extension() == ".csv") *pose = *pose * sequence_.rectification().T_body_left();
@@ -73,6 +72,17 @@ class FolderRecording : public Recording {
     return {log.checkTopics(), log.checkStamps(), {Verdict::kOpen, "a folder has none"}, log.pairRate(), std::nullopt};
   }
 
+  std::set<std::int64_t> leftStamps() const override {
+    std::set<std::int64_t> stamps;
+    for (int i = 0; i < size(); ++i) stamps.insert(sequence_.stamp(i));
+    return stamps;
+  }
+
+  std::size_t firstNumber() const override {
+    if constexpr (kIsEuroc) return 0;
+    else return static_cast<std::size_t>(sequence_.first());
+  }
+
  private:
   void give(int i, std::int64_t stamp, const Use& use) const {
     const ImagePair pair = sequence_.loadRectified(i);
@@ -89,7 +99,7 @@ class BagRecording : public Recording {
  public:
   /// Throws std::runtime_error where a topic is missing.
   BagRecording(const std::vector<std::string>& parts, const StereoSource& source)
-      : fov_(source.fov), infos_(infosOf(source)), pairing_(source.pairing) {
+      : fov_(source.fov), pairing_(source.pairing) {
     ros::Time begin;  // of the part before; its end may be a little later than the next one's begin
     for (const std::string& part : parts) {
       openBag(part, *bags_.emplace_back(std::make_unique<rosbag::Bag>()));
@@ -101,7 +111,13 @@ class BagRecording : public Recording {
       });
       names_ += (names_.empty() ? "'" : ", '") + part + "'";
     }
-    topics_ = ofBag(parts.front(), [&] { return topicsIn(*bags_.front(), source); });
+    ofBag(parts.front(), [&] {
+      topics_ = topicsIn(*bags_.front(), source);
+      rosbag::View images(*bags_.front(), rosbag::TopicQuery(topics_[0]));
+      if (source.calibration.empty() || images.size() == 0) return;
+      const auto image = readStereoMessage(*images.begin(), topics_).image;
+      infos_ = infosOf(source, cv::Size(static_cast<int>(image->width), static_cast<int>(image->height)));
+    });
   }
 
   int size() const override {
@@ -118,7 +134,7 @@ class BagRecording : public Recording {
   }
 
   void forEachBackwards(const Use& use) const override {
-    PairReader reader(topics_, fov_);
+    PairReader reader(topics_, fov_, finder());
     const std::int64_t ends = used_.front().stamp + used_.back().stamp;
     for (auto pair = used_.rbegin(); pair != used_.rend(); ++pair) {
       StereoPairMessages messages = pair->messages;
@@ -131,11 +147,18 @@ class BagRecording : public Recording {
   }
 
   ArrivalFindings arrivals(const std::string& base_frame) const override { return input_->findings(base_frame, true); }
+  std::set<std::int64_t> leftStamps() const override { return input_->leftStamps(); }
 
  private:
+  ros_conversions::FindTransform finder() const {
+    return [this](const std::string& parent, const std::string& child, std::string& problem) {
+      return input_->find(parent, child, problem);
+    };
+  }
+
   int useAll(int limit, const Use& use, const Refuse& refuse) {
     StampFilter<ArrivedPair> filter;
-    PairReader reader(topics_, fov_);
+    PairReader reader(topics_, fov_, finder());
     int refused = 0;
     std::string problem;
     used_.clear();
@@ -162,8 +185,11 @@ class BagRecording : public Recording {
       }
     });
 
+    for (const auto& bag : bags_)  // may come after the first pairs
+      for (const rosbag::MessageInstance& instance : rosbag::View(*bag, rosbag::TopicQuery("/tf_static")))
+        input_->add(instance);
     std::vector<std::string> wanted(topics_.begin(), topics_.end());
-    wanted.insert(wanted.end(), {"/tf", "/tf_static"});
+    wanted.emplace_back("/tf");
     rosbag::View view;
     for (const auto& bag : bags_) {
       view.addQuery(*bag, rosbag::TopicQuery(wanted));
@@ -176,7 +202,7 @@ class BagRecording : public Recording {
   }
 
   const double fov_;
-  const std::optional<StereoInfos> infos_;  ///< in place of those of the bag
+  std::optional<StereoInfos> infos_;  ///< in place of those of the bag
   const PairingOptions pairing_;
   std::vector<std::unique_ptr<rosbag::Bag>> bags_;
   std::string names_;  ///< of the bags, in quotes
@@ -189,7 +215,11 @@ class BagRecording : public Recording {
 
 std::vector<std::optional<Eigen::Isometry3d>> Recording::truth(const std::string& path,
                                                                const std::vector<std::int64_t>& stamps) const {
-  return readGroundTruth(path, stamps);
+  const std::set<std::int64_t> all = leftStamps();
+  std::vector<std::size_t> numbers;
+  for (const std::int64_t stamp : stamps)
+    numbers.push_back(static_cast<std::size_t>(std::distance(all.begin(), all.find(stamp))));
+  return readGroundTruth(path, stamps, numbers, firstNumber());
 }
 
 std::unique_ptr<Recording> openRecording(const std::vector<std::string>& parts, const StereoSource& source) {
@@ -199,13 +229,14 @@ std::unique_ptr<Recording> openRecording(const std::vector<std::string>& parts, 
   if (parts.size() > 1 || !fs::is_directory(path)) return std::make_unique<BagRecording>(parts, source);
   if (const auto mav0 = findMav0(path))
     return std::make_unique<FolderRecording<EurocSequence>>(*mav0, source.calibration, source.fov);
-  for (const char* images : {"image_0", "image_1", "image_2", "image_3"})
-    if (fs::is_directory(fs::path(path) / images)) return std::make_unique<FolderRecording<KittiSequence>>(path);
+  if (isKittiLayout(path))
+    return std::make_unique<FolderRecording<KittiSequence>>(
+        path, KittiCameras::kAny, KittiSequence::Override{source.calibration, source.fov, source.rate});
   throw std::runtime_error(
       "'" + path + "' is " +
       (fs::exists(fs::path(path) / "metadata.yaml") ? "a bag of ROS 2 or another" : "no recording:") +
-      " folder; KITTI's (image_0, image_1, calib.txt, times.txt), EuRoC's and TUM-VI's (mav0, or cam0 "
-      "and cam1) are read, and bags of ROS 1 (of a folder of bags each one: run_many)");
+      " folder. Folders that are read (docs/tools.md) have mav0, or cam0 and cam1 (EuRoC, TUM-VI), or " +
+      kittiLayouts() + ". Bags of ROS 1 are read, too (of a folder of bags each one: run_many)");
 }
 
 }  // namespace sdvo

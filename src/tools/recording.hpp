@@ -6,6 +6,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -52,13 +53,20 @@ class Recording {
   /// between pairs is the same.
   virtual void forEachBackwards(const Use& use) const = 0;
 
-  /// True poses of the rectified left camera, as readGroundTruth() reads them. EuRoC's CSV has the IMU's poses, which
-  /// become the camera's here.
+  /// True poses of the rectified left camera at the stamps of used pairs, as readGroundTruth() reads them: lines without
+  /// stamps are of all left images, also of those in no pair. EuRoC's CSV has the IMU's poses, which become the camera's
+  /// here.
   virtual std::vector<std::optional<Eigen::Isometry3d>> truth(const std::string& path,
                                                               const std::vector<std::int64_t>& stamps) const;
 
   /// How the messages of forEach() arrived, and where TF has the camera.
   virtual ArrivalFindings arrivals(const std::string& base_frame) const = 0;
+
+ protected:
+  /// Of all left images that came until the last used pair.
+  virtual std::set<std::int64_t> leftStamps() const = 0;
+  /// Number of the first left image.
+  virtual std::size_t firstNumber() const { return 0; }
 };
 
 /// A bag, a folder in KITTI's layout, or a raw folder in that of EuRoC and TUM-VI (ASL). Raw images are rectified.

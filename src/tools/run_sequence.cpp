@@ -16,7 +16,9 @@
 #include <vector>
 
 #include "../common/progress.hpp"
+#include "../common/text.hpp"
 #include "../config/pipeline_options.hpp"
+#include "../data/image_file.hpp"
 #include "../data/text_file.hpp"
 #include "camera_check.hpp"
 #include "drive_page.hpp"
@@ -135,6 +137,22 @@ void printErrors(const PlaceErrors& errors) {
             << "ATE before " << errors.ate_before << " m, after " << errors.ate_after << " m\n";
 }
 
+std::vector<std::int64_t> stampsOf(const OfflineRun& run) {
+  std::vector<std::int64_t> stamps;
+  for (const auto& frame : run.frames()) stamps.push_back(frame.odometry.stamp);
+  return stamps;
+}
+
+/// The true pose of each pair.
+Trajectory wholeTruth(const Recording& recording, const OfflineRun& run, const std::string& path) {
+  Trajectory poses;
+  for (const auto& pose : recording.truth(path, stampsOf(run))) {
+    if (!pose) throw std::runtime_error(text(0, "file '", path, "' has no pose of pair ", poses.size()));
+    poses.push_back(*pose);
+  }
+  return poses;
+}
+
 Finding makePage(const Recording& recording, const Drive& drive, const Seen& seen, const std::vector<SelfCheck>& checks,
                  const PipelineOptions& options, const Arguments& arguments) {
   const std::string& input = arguments.inputs.front();
@@ -150,9 +168,7 @@ Finding makePage(const Recording& recording, const Drive& drive, const Seen& see
   if (arrivals.T_base_camera) report.R_base_camera = arrivals.T_base_camera->linear();
   report.self_checks = checks;
   report.pictures = seen.pictures.pictures();
-  std::vector<std::int64_t> stamps;
-  for (const auto& frame : drive.whole.frames()) stamps.push_back(frame.odometry.stamp);
-  if (!arguments.truth.empty()) report.truth = recording.truth(arguments.truth, stamps);
+  if (!arguments.truth.empty()) report.truth = recording.truth(arguments.truth, stampsOf(drive.whole));
   if (const std::string live = arguments.live.empty() ? input : arguments.live; fs::is_regular_file(live)) {
     rosbag::Bag bag;
     openBag(live, bag);
@@ -264,8 +280,12 @@ int run(const Arguments& arguments) {
 
   std::cout << std::fixed << std::setprecision(1);
   places ? printSummary(run, *places, way + run.distance()) : printSummary(run, options);
-  if (places && !arguments.truth.empty()) printErrors(places->errors(readKittiPoses(arguments.truth)));
+  if (places && !arguments.truth.empty()) printErrors(places->errors(wholeTruth(*recording, run, arguments.truth)));
   if (drive.left_out > 0) std::cout << drive.left_out << " stamps without a usable pair\n";
+  if (drive.left_out > 0 && !arguments.poses.empty() && (places || arguments.format != "tum"))
+    std::cerr << "note: lines of --poses are of used pairs alone: where a truth has a line for each image, --format tum "
+                 "compares by stamps" << std::endl;
+  if (!run.mosaic().empty()) std::cerr << "warning: " << run.mosaic() << std::endl;
   const std::vector<SelfCheck> checks = checkItself(*recording, drive, options, arguments);
   for (const SelfCheck& check : checks) std::cout << check.text() << "\n";
   if (!arguments.output.empty()) writeResults(drive, checks, options, arguments);
@@ -286,7 +306,7 @@ int main(int argc, char** argv) {
       "is FAIL. Many drives: run_many");
   Arguments arguments;
   app.add_option("recordings", arguments.inputs,
-                 "bag, folder with image_0, image_1, calib.txt, times.txt, or folder with mav0")
+                 "bag, folder with image_0, image_1, calib.txt, times.txt, or another one of docs/tools.md")
       ->required();
   app.add_option("--config", arguments.config, "YAML file as the nodelets load it");
   app.add_option("--param", arguments.settings,

@@ -19,6 +19,9 @@
 #include <utility>
 #include <vector>
 
+#include "../common/text.hpp"
+#include "../data/file_kind.hpp"
+#include "../messages/image_conversions.hpp"
 #include "../ros/camera_finder.hpp"
 
 namespace sdvo {
@@ -45,7 +48,7 @@ sensor_msgs::ImageConstPtr decode(const sensor_msgs::CompressedImage& compressed
   const cv::Mat pixels = compressed.data.empty() ? cv::Mat() : cv::imdecode(compressed.data, cv::IMREAD_UNCHANGED);
   const auto image = boost::make_shared<sensor_msgs::Image>();
   image->header = compressed.header;
-  image->encoding = encodingOf(pixels);
+  image->encoding = pixels.empty() ? ros_conversions::kUndecoded + compressed.format : encodingOf(pixels);
   image->height = static_cast<std::uint32_t>(pixels.rows);
   image->width = static_cast<std::uint32_t>(pixels.cols);
   image->step = static_cast<std::uint32_t>(pixels.cols * pixels.elemSize());
@@ -78,9 +81,18 @@ std::string layoutOf(const std::string& definition, const std::string& type = ""
   return layout;
 }
 
-/// First bytes of files that users take for bags of ROS 1, and their formats.
-const std::pair<const char*, const char*> kOtherFiles[] = {
-    {"SQLite format 3", "a bag of ROS 2 (SQLite)"}, {"\x89MCAP", "an MCAP file"}, {"PK", "a ZIP archive"}};
+/// Where a bag has its index, by its first record; 0: nowhere, or no bag.
+std::uint64_t placeOfIndex(const std::string& path) {
+  std::string begin(256, '\0');
+  std::ifstream(path, std::ios::binary).read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  const std::string name = "index_pos=";
+  const std::size_t at = begin.find(name);
+  std::uint64_t place = 0;  // as bags have it: little-endian
+  if (begin.rfind("#ROSBAG V2", 0) == 0 && at < begin.size() - name.size() - sizeof place)
+    for (std::size_t i = 0; i < sizeof place; ++i)
+      place |= std::uint64_t{static_cast<unsigned char>(begin[at + name.size() + i])} << (8 * i);
+  return place;
+}
 
 /// Usual names of raw images.
 const std::vector<std::string> kRawImages = {"image_raw", "image_mono", "image", "image_color"};
@@ -97,13 +109,15 @@ void StereoSource::addTo(CLI::App& app) {
   app.add_option("--infos", infos, "topics: camera_info of left and right, where they are not beside the images")
       ->expected(2);
   app.add_option("--calibration", calibration,
-                 "in place of camera_info or sensor.yaml: Kalibr's camera chain, or the files of left and right: "
-                 "camera_info (YAML) or sensor.yaml of EuRoC")
-      ->expected(1, 2)
+                 "file in place of camera_info or sensor.yaml, or two, left and right: of Kalibr, camera_calibration, "
+                 "OpenCV, ORB-SLAM, VINS or EuRoC")
+      ->expected(1, 3)
       ->check(CLI::ExistingFile);
   app.add_option("--fov", fov, "raw images: field of view once rectified, from side to side, deg; 0: as calibrated")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 170.0));
+  app.add_option("--rate", rate, "folders without a file of times: rate of the pairs, Hz")
+      ->check(CLI::Range(0.001, 10000.0));
 }
 
 std::string StereoSource::folder() const {
@@ -168,7 +182,7 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
       throw std::runtime_error("'" + path + "' has images on " + topics[0] + " and " + topics[1] + ", but no " +
                                topics[input] +
                                ": the calibration is missing. Give it: --calibration camchain.yaml (Kalibr's), or "
-                               "--calibration left.yaml right.yaml (camera_info or EuRoC's sensor.yaml)");
+                               "--calibration left.yaml right.yaml (camera_info and others: docs/tools.md)");
   for (const std::size_t input : {0u, 1u})
     if (rosbag::View(bag, rosbag::TopicQuery(topics[input])).size() == 0) topics[input] += "/compressed";
   return topics;
@@ -185,13 +199,11 @@ void refuseWhatIsWritten(const std::string& path) {
 
 void openBag(const std::string& path, rosbag::Bag& bag) {
   if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("'" + path + "' is no file");
-  std::string begin(16, '\0');
-  std::ifstream(path, std::ios::binary).read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  for (const auto& [magic, what] : kOtherFiles)
-    if (begin.rfind(magic, 0) == 0)
-      throw std::runtime_error(
-          "'" + path + "' is " + what +
-          ", no bag of ROS 1: convert it, for example by rosbags-convert of the Python package rosbags");
+  if (const std::string other = otherKindOf(path); !other.empty())
+    throw std::runtime_error("'" + path + "' is " + other + ". Bags of ROS 1 are read");
+  if (const std::uint64_t begun = placeOfIndex(path); begun > std::filesystem::file_size(path))
+    throw std::runtime_error(text(0, "'", path, "' is a part of a bag, ", std::filesystem::file_size(path),
+                                  " bytes of more than ", begun, ": copy it again"));
   ofBag(path, [&] { bag.open(path, rosbag::bagmode::Read); });
 }
 

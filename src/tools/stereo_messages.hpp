@@ -31,6 +31,7 @@ struct StereoSource {
   double fov = 0.0;                      ///< of raw images once they are rectified, deg; 0: as calibrated
   std::vector<std::string> infos;        ///< topics of camera_info, left and right; none: beside the images
   PairingOptions pairing;
+  double rate = 0.0;                     ///< of a folder's pairs, Hz; 0: as its file of times says
 
   void addTo(CLI::App& app);
   std::string folder() const;  ///< the namespace, which ends with `/`

@@ -141,6 +141,98 @@ TEST_F(CalibrationFile, IsKnownByWhatItHolds) {
   EXPECT_TRUE(readCalibration(infos({})).raw(1).is_equidistant);
 }
 
+/// A rig of 120x80 px, f 50 px, 0.1 m, as the programs of others write it.
+TEST_F(CalibrationFile, OfOtherProgramsGivesTheSameRig) {
+  const auto matrix = [](const std::string& name, int rows, int columns, const std::string& data) {
+    return name + ": !!opencv-matrix\n  rows: " + std::to_string(rows) + "\n  cols: " + std::to_string(columns) +
+           "\n  dt: d\n  data: [" + data + "]\n";
+  };
+  const std::string yaml = "%YAML:1.0\n---\n", k = "50, 0, 60, 0, 50, 40, 0, 0, 1", none = "0, 0, 0, 0",
+                    one = "1, 0, 0, 0, 1, 0, 0, 0, 1", p1 = "50, 0, 60, 0, 0, 50, 40, 0, 0, 0, 1, 0",
+                    p2 = "50, 0, 60, -5, 0, 50, 40, 0, 0, 0, 1, 0";
+  const auto pose = [](double x) { return "1, 0, 0, " + std::to_string(x) + ", 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1"; };
+  const auto message = [&](const std::string& p) {
+    return "header:\n  seq: 1\nheight: 80\nwidth: 120\ndistortion_model: \"plumb_bob\"\nD: [" + none + ", 0]\nK: [" +
+           k + "]\nR: [" + one + "]\nP: [" + p + "]\n---\n";
+  };
+  const auto ost = [&](const std::string& side, const std::string& tx) {
+    return "# oST version 5.0 parameters\n\n[image]\n\nwidth\n120\n\nheight\n80\n\n[narrow_stereo/" + side +
+           "]\n\ncamera matrix\n50 0 60\n0 50 40\n0 0 1\n\ndistortion\n0 0 0 0 0\n\nrectification\n1 0 0\n0 1 0\n0 0 "
+           "1\n\nprojection\n50 0 60 " +
+           tx + "\n0 50 40 0\n0 0 1 0\n\n";
+  };
+  const auto kalibr = [&](double x) {
+    return camera({"radtan"}, "  ", "distortion_coeffs") + "  T_cam_imu: [" + pose(x) + "]\n";
+  };
+  const auto orb3 = [](const std::string& n) {
+    return "Camera" + n + ".fx: 50\nCamera" + n + ".fy: 50\nCamera" + n + ".cx: 60\nCamera" + n + ".cy: 40\n";
+  };
+  const std::string orb_size = "Camera.width: 120\nCamera.height: 80\n";
+  const auto vins = [&](const std::string& name) {
+    const std::string path = (folder_.path() / name).string();
+    std::ofstream(path) << yaml << "model_type: PINHOLE\nimage_width: 120\nimage_height: 80\n"
+                        << "distortion_parameters: {k1: 0, k2: 0, p1: 0, p2: 0}\n"
+                        << "projection_parameters: {fx: 50, fy: 50, cx: 60, cy: 40}\n";
+    return path;
+  };
+  const std::string vins0 = vins("cam0_pinhole.yaml"), vins1 = vins("cam1_pinhole.yaml"),
+                    vins_config = write(yaml + matrix("body_T_cam0", 4, 4, pose(0.0)) +
+                                        matrix("body_T_cam1", 4, 4, pose(0.1)) +
+                                        "cam0_calib: cam0_pinhole.yaml\ncam1_calib: cam1_pinhole.yaml\n");
+  const std::string intrinsics = matrix("M1", 3, 3, k) + matrix("D1", 1, 4, none) + matrix("M2", 3, 3, k) +
+                                 matrix("D2", 1, 4, none),
+                    rectified = matrix("R1", 3, 3, one) + matrix("R2", 3, 3, one) + matrix("P1", 3, 4, p1) +
+                                matrix("P2", 3, 4, p2),
+                    pair = matrix("R", 3, 3, one) + matrix("T", 3, 1, "-0.1, 0, 0");
+  std::string xml = "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_width>120</image_width><image_height>80</image_height>";
+  for (const auto& [name, rows, data] : {std::tuple("M1", 3, k), {"D1", 1, none}, {"M2", 3, k}, {"D2", 1, none},
+                                         {"R", 3, one}, {"T", 3, std::string("-0.1, 0, 0")}}) {
+    std::string blanks = data;
+    blanks.erase(std::remove(blanks.begin(), blanks.end(), ','), blanks.end());
+    const auto count = static_cast<int>(std::count(blanks.begin(), blanks.end(), ' ')) + 1;
+    xml += std::string("<") + name + " type_id=\"opencv-matrix\"><rows>" + std::to_string(rows) + "</rows><cols>" +
+           std::to_string(count / rows) + "</cols><dt>d</dt><data>" + blanks + "</data></" + name + ">";
+  }
+  const auto orb2 = [&](const std::string& side, const std::string& p) {
+    return side + ".height: 80\n" + side + ".width: 120\n" + matrix(side + ".D", 1, 5, none + ", 0") +
+           matrix(side + ".K", 3, 3, k) + matrix(side + ".R", 3, 3, one) + matrix(side + ".P", 3, 4, p);
+  };
+  const std::vector<std::pair<const char*, std::vector<std::string>>> cases = {
+      {"T_cam_imu", {write("cam0:\n" + kalibr(0.0) + "cam1:\n" + kalibr(-0.1))}},
+      {"T_cam_imu in two files", {write("cam0:\n" + kalibr(0.0)), write("cam0:\n" + kalibr(-0.1))}},
+      {"rostopic", {write(message(p1)), write(message(p2))}},
+      {"ost.txt", {write(ost("left", "0") + ost("right", "-5"))}},
+      {"ost.txt, two", {write(ost("left", "0")), write(ost("right", "-5"))}},
+      {"OpenCV", {write(yaml + intrinsics), write(yaml + rectified + pair)}},
+      {"OpenCV in one file", {write(yaml + intrinsics + pair)}},
+      {"OpenCV's XML", {write(xml + "</opencv_storage>\n")}},
+      {"ORB-SLAM2", {write("%YAML:1.0\nCamera.fx: 1\nCamera.bf: 7\n" + orb2("LEFT", p1) + orb2("RIGHT", p2))}},
+      {"ORB-SLAM2, rectified", {write(yaml + orb3("") + orb_size + "Camera.bf: 5.0\n")}},
+      {"ORB-SLAM3", {write(yaml + "Camera.type: \"PinHole\"\n" + orb3("1") + orb3("2") + orb_size +
+                           matrix("Stereo.T_c1_c2", 4, 4, pose(0.1)))}},
+      {"ORB-SLAM3, rectified",
+       {write(yaml + "Camera.type: \"Rectified\"\n" + orb3("1") + orb_size + "Stereo.b: 0.1\n")}},
+      {"VINS", {vins_config}},
+      {"VINS, three files", {vins_config, vins0, vins1}}};
+  for (const auto& [name, files] : cases) {
+    SCOPED_TRACE(name);
+    const std::string error = errorOf([&, read = files] { readCalibration(read, 80.0, {120, 80}); });
+    ASSERT_EQ(error, "no error");
+    EXPECT_NEAR(readCalibration(files, 80.0, {120, 80}).camera().baseline, 0.1, 1e-6);
+    EXPECT_EQ(readCalibration(files, 80.0, {120, 80}).raw(1).K(0, 2), 60.0);
+  }
+  EXPECT_TRUE(readCalibration({vins_config}, 80.0).T_body_left().isApprox(Eigen::Isometry3d::Identity()));
+  for (const auto& [files, words] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{write(yaml + intrinsics + pair)}, "no 'image_"},
+           {{vins0, vins1}, "pose between them"},
+           {{write(ost("left", "0"))}, "one camera alone"},
+           {{write("cam0:\n" + kalibr(0.0) + "cam1:\n" + camera({"radtan"}, "  ", "distortion_coeffs"))}, "T_cam_imu"},
+           {{write("cam0:\n\tcamera_model: pinhole\n")}, "tabs"},
+           {{write("<!DOCTYPE html><html>")}, "an HTML page"},
+           {{write("version https://git-lfs.github.com/spec/v1\noid sha256:0\n")}, "git lfs pull"}})
+    expectError([&, wrong = files] { readCalibration(wrong); }, {words});
+}
+
 TEST_F(CalibrationFile, WhatIsWrongIsNamed) {
   Files other_lens, omni, swapped, short_matrix, mono;
   other_lens.lens = "fov";
@@ -148,15 +240,16 @@ TEST_F(CalibrationFile, WhatIsWrongIsNamed) {
   swapped.T_cn_cnm1 = "[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]";
   short_matrix.T_cn_cnm1 = "[1, 0, 0, 0.1]";
   mono.right_p = "55, 0, 60, 0, 0, 50, 40, 0, 0, 0, 1, 0";
-  const std::string formats = "one file of Kalibr's (cam0, cam1), or two";
+  const std::string formats = "Kalibr's camera chain (cam0, cam1)";
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {chain(other_lens), "'fov' is not supported"},
       {sensors(other_lens), "'fov' is not supported"},
       {infos(other_lens), "'fov' is not supported"},
       {chain(omni), "camera_model 'omni'"},
       {chain(swapped), "swapped"},
-      {chain(short_matrix), "not a rotation"},
+      {chain(short_matrix), "'T_cn_cnm1' of 16, found 4"},
       {infos(mono), "55.000 on the right"},
+      {{infos({})[1], infos({})[0]}, "swapped"},
       {{infos({})[0]}, formats},
       {{infos({})[0], chain({})[0]}, formats},
       {{"nowhere.yaml"}, "nowhere.yaml': it does not exist"},

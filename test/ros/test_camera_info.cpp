@@ -90,6 +90,26 @@ TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
   EXPECT_TRUE(contains(without_tx, "no baseline in P") && !contains(without_tx, "swapped")) << without_tx;
 }
 
+/// Simulators leave P[3] at 0 and have both optical frames on TF.
+TEST(ToStereoCamera, ABaselineThatPLacksIsThatOfTheOpticalFramesOnTf) {
+  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(0.0);
+  left.header.frame_id = "left_optical";
+  right.header.frame_id = "/right_optical";
+  Eigen::Isometry3d T_left_right = Eigen::Isometry3d(Eigen::Translation3d(0.12, 1e-4, 0.0));
+  const auto find = [&](const std::string& parent, const std::string& child, std::string& problem) {
+    problem = "unknown frame";
+    return parent == "left_optical" && child == "right_optical" ? std::optional(T_left_right) : std::nullopt;
+  };
+  EXPECT_DOUBLE_EQ(toStereoCamera(left, right, find).baseline, 0.12);
+  EXPECT_DOUBLE_EQ(toStereoCamera(left, cameraInfo(-350.0), find).baseline, 0.5) << "P has one";
+  T_left_right.translation() = Eigen::Vector3d(0.0, -0.12, 0.0);  // of a body's frame, x ahead
+  expectError([&] { toStereoCamera(left, right, find); }, {"no baseline in P", "'right_optical' at 0.000 -0.120", "optical"});
+  right.header.frame_id = "elsewhere";
+  expectError([&] { toStereoCamera(left, right, find); }, {"no baseline in P", "'elsewhere'", "unknown frame"});
+  right.header.frame_id = left.header.frame_id;
+  expectError([&] { toStereoCamera(left, right, find); }, {"no baseline in P", "both camera_info name the frame"});
+}
+
 TEST(ToStereoCamera, TheLensChangesNothingOfARegionOfInterest) {
   // A window out of the raw image (do_rectify, as CameraInfo.msg asks) is the same window of the rectified one:
   // image_proc publishes as many pixels. So are those that crop_decimate cuts out of rectified images.

@@ -61,6 +61,10 @@ TEST(ToGrey, CamerasOfFewerBitsFillTheRange) {
   EXPECT_EQ(toGrey(message, {341.0, 1023.0}).at<std::uint8_t>(0, 1), 0);
 }
 
+TEST(ToGrey, ACompressedImageThatCannotBeDecodedIsNamedByItsFormat) {
+  expectError([] { toGrey(image(kUndecoded + "16UC1; compressedDepth png", 1, 1, {0})); }, {"compressedDepth", "JPEG"});
+}
+
 /// A scene whose counts rise evenly from `dark` to `bright` across the image.
 sensor_msgs::ImagePtr ramp(int dark, int bright) {
   constexpr int kWidth = 200, kHeight = 120;

@@ -12,6 +12,7 @@
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
@@ -483,7 +484,7 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
 
   const std::string checked = run("check_camera", "--bag " + renamed + names).out;
   EXPECT_EQ(checked.rfind("OK   topics", 0), 0u) << checked;
-  EXPECT_TRUE(contains(checked, "malformed image: 0 bytes")) << checked;
+  EXPECT_TRUE(contains(checked, "cannot be decoded")) << checked;
 }
 
 /// As `rosbag record --split` leaves a drive: the end of a part may divide a pair.
@@ -603,6 +604,42 @@ TEST_F(Tools, ABagBecomesAFolder) {
   succeed("convert", bag("a") + " --poses " + in("truth.txt") + " --output " + folder.string());
   EXPECT_EQ(posesOf(folder.string()), posesOf(drive_));
   EXPECT_EQ(linesIn("folder/poses.txt").size(), static_cast<std::size_t>(kPairs));
+}
+
+/// Lines of a truth without stamps are of all left images, also of those that make no pair.
+TEST_F(Tools, TheTruthOfABagThatLacksAnImageIsThatOfItsPairs) {
+  const std::string torn = rewritten(bag("whole"), "torn", [n = 0](rosbag::Bag& out, const auto& message) mutable {
+    if (!contains(message.getTopic(), "/right/image") || n++ != 1) out.write(message.getTopic(), message.getTime(), message);
+  });
+  succeed("convert", torn + " --poses " + in("truth.txt") + " --output " + in("folder"));
+  const std::vector<std::string> poses = linesIn("folder/poses.txt");
+  ASSERT_EQ(poses.size(), static_cast<std::size_t>(kPairs - 1));
+  EXPECT_NEAR(numbersOf(poses[1])[11], 2 * kStep, 1e-9);
+  const Outcome outcome = runOn(torn);
+  EXPECT_EQ(outcome.exit_code, 0);
+  expectWords(outcome.err, {"--format tum"});
+}
+
+TEST_F(Tools, ABaselineOnTfStandsForOneThatCameraInfoLacks) {
+  const std::string simulated = rewritten(bag("told"), "simulated", [](rosbag::Bag& out, const auto& message) {
+    const auto info = message.template instantiate<sensor_msgs::CameraInfo>();
+    if (!info) return out.write(message.getTopic(), message.getTime(), message);
+    info->P[3] = 0.0;
+    if (contains(message.getTopic(), "/right/")) info->header.frame_id = "stereo_right_optical";
+    out.write(message.getTopic(), message.getTime(), *info);
+  });
+  EXPECT_EQ(posesOf(simulated), posesOf(drive_));
+}
+
+TEST_F(Tools, AMosaicIsNamed) {
+  for (int i = 0; i < kPairs; ++i) {
+    cv::Mat left = cv::imread(image(0, i).string(), cv::IMREAD_GRAYSCALE);
+    for (int y = 0; y < left.rows; ++y)
+      for (int x = y % 2; x < left.cols; x += 2) left.at<std::uint8_t>(y, x) /= 2;
+    cv::imwrite(image(0, i).string(), left);
+  }
+  const Outcome outcome = runSequence("--states " + in("states.csv"));
+  expectWords(outcome.err, {"left image", "mosaic", "stereo_raw.launch"});
 }
 
 /// Many recordings, a process for each: what is finished stays.
@@ -937,6 +974,21 @@ TEST_F(Tools, PerfectTrajectoryHasNoError) {
   EXPECT_DOUBLE_EQ(static_cast<double>(per_length[1]["length_m"]), 0.4);
   EXPECT_NEAR(static_cast<double>(per_length[1]["translation_percent"]), 0.0, 1e-9);
   expectError(run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + in("none")), in("none"));
+}
+
+TEST_F(Tools, WhatDiffersIsSaidBeforeHowMuch) {
+  std::ofstream late(in("late.txt")), stamped(in("stamped.txt"));
+  for (int i = 0; i < 100; ++i)
+    for (std::ofstream* file : {&late, &stamped})
+      *file << 1700000000000 + 100 * i + (file == &late ? 300 : 0) << " 0 0 " << 0.1 * i + std::sin(0.3 * i) << " 0 0 0 1\n";
+  late.close(), stamped.close();
+  const std::string files = "--lengths 1 --ground-truth " + in("late.txt") + " --estimate " + in("stamped.txt");
+  const Outcome said = succeed("evaluate_trajectory", files);
+  EXPECT_LT(said.out.find("differs: stamps of"), said.out.find("differs: clocks are shifted"));
+  EXPECT_LT(said.out.find("lack 0.300 s"), said.out.find("ATE"));
+  EXPECT_TRUE(contains(succeed("evaluate_trajectory", files + " --offset auto").out, "0.0000"));
+  EXPECT_TRUE(contains(succeed("evaluate_trajectory", files + " --offset 0.3").out, "0.0000"));
+  expectError(run("evaluate_trajectory", files + " --offset soon"), "soon");
 }
 
 }  // namespace sdvo::test_tools

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <cstdio>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -12,24 +14,19 @@
 
 namespace sdvo {
 
+class StereoRectification;
+
+/// A pair of the same size, CV_8U grey.
+struct ImagePair {
+  cv::Mat left, right;
+};
+
 /// "000042", the name of frame 42's files without their ending.
 inline std::string kittiFrameName(int i) {
   char name[16];
   std::snprintf(name, sizeof name, "%06d", i);
   return name;
 }
-
-/// A rectified pair of the same size, CV_8U grey.
-struct ImagePair {
-  cv::Mat left, right;
-};
-
-/// Reads a PNG as CV_8U grey. Throws std::runtime_error that names the file when it is missing, no PNG, truncated or
-/// damaged; cv::imread would return whatever could be decoded of it.
-cv::Mat readGreyPng(const std::string& path);
-
-/// In the format of the name's ending. Throws std::runtime_error that names the file when it cannot be written.
-void writeImage(const std::string& path, const cv::Mat& image);
 
 /// Which cameras of a KITTI car to use.
 enum class KittiCameras {
@@ -42,39 +39,62 @@ enum class KittiCameras {
 /// if the two matrices are missing or belong to no rectified pair.
 StereoCamera readKittiCalibration(const std::string& path, KittiCameras cameras);
 
-/// One sequence in the layout of the KITTI odometry benchmark: a directory with image_0, image_1 (or image_2, image_3),
-/// calib.txt and times.txt. Every error is a std::runtime_error that names the file and what is wrong with it.
+/// The layouts that KittiSequence reads, in words.
+std::string kittiLayouts();
+/// Whether a folder has images in one of them.
+bool isKittiLayout(const std::string& directory);
+
+/// One drive of numbered images in two folders, in the layout of KITTI's odometry benchmark (image_0, image_1,
+/// calib.txt, times.txt) or another one of kittiLayouts(). Numbers may begin anywhere. Every error is a std::runtime_error that names the file and what is wrong with it.
 ///
 /// The official poses are those of the left grey camera; the left colour camera sits about 6 cm beside it.
 class KittiSequence {
  public:
+  /// What stands for the folder's own files.
+  struct Override {
+    std::vector<std::string> calibration = {};  ///< of raw images, for readCalibration(); none: calib.txt
+    double fov = 0.0;                           ///< of the rectified images, deg; 0: as calibrated
+    double rate = 0.0;                          ///< of the pairs, Hz; 0: times.txt
+  };
+
   /// Checks names and number of the images, the calibration and the stamps, and decodes the first left image for its
   /// size; the other images are only read by load().
-  explicit KittiSequence(const std::string& directory, KittiCameras cameras = KittiCameras::kAny);
+  explicit KittiSequence(const std::string& directory, KittiCameras cameras = KittiCameras::kAny)
+      : KittiSequence(directory, cameras, Override()) {}
+  KittiSequence(const std::string& directory, KittiCameras cameras, const Override& given);
 
   const std::string& directory() const { return directory_; }
+  /// Of the rectified views.
   const StereoCamera& camera() const { return camera_; }
+  /// Of raw images; null: they are rectified.
+  const StereoRectification* rectification() const { return rectification_.get(); }
   int size() const { return static_cast<int>(stamps_.size()); }
+  int unpaired() const { return 0; }
 
   /// Time of frame i since the start of the sequence's clock, ns; strictly increasing.
   std::int64_t stamp(int i) const { return stamps_.at(static_cast<std::size_t>(i)); }
+  /// Number of frame 0 in the names of its images.
+  std::int64_t first() const { return first_; }
 
-  /// Decodes frame i; both images have the size of camera(). May be called from several threads.
+  /// Decodes frame i as the folder has it. May be called from several threads.
   ImagePair load(int i) const;
-  /// The same, for they are rectified.
-  ImagePair loadRectified(int i) const { return load(i); }
+  /// The same in the views of camera().
+  ImagePair loadRectified(int i) const;
 
  private:
-  std::string imagePath(int side, int i) const;
+  void listFrames(const std::array<std::string, 2>& folders);
 
   std::string directory_;
-  std::string image_directories_[2];  ///< left and right
+  std::vector<std::array<std::string, 2>> frames_;  ///< left and right image
+  std::int64_t first_ = 0;
+  cv::Size size_;  ///< of the images
+  std::shared_ptr<const StereoRectification> rectification_;
   StereoCamera camera_;
   std::vector<std::int64_t> stamps_;
 };
 
-/// The ground-truth file of a sequence directory, if there is one: poses.txt in it, or ../../poses/NN.txt as in the
-/// official layout (directory sequences/NN).
+/// The ground-truth file of a sequence directory, if there is one: poses.txt or pose_left.txt (TartanAir) in it, or
+/// ../../poses/NN.txt as in the official layout (directory sequences/NN).
 std::optional<std::string> findKittiPoses(const std::string& directory);
 
 /// Writes a sequence that KittiSequence reads: image_0, image_1, calib.txt, times.txt and poses.txt. The directory gets

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/cpp17.hpp"
@@ -19,15 +18,17 @@ using Trajectory = std::vector<Eigen::Isometry3d>;
 struct StampedTrajectory {
   std::vector<std::int64_t> stamps;  ///< ns; none where a file has none
   Trajectory poses;
+  std::vector<std::string> remarks = {};  ///< what is unusual about a file, in words
 };
 
 /// Pose from the rows of its 3x4 matrix. A rotation written with few digits is replaced by the nearest exact one;
 /// throws std::invalid_argument when the matrix is none (rows not orthonormal to 1e-3, a reflection, or not finite).
 Eigen::Isometry3d poseFromRows(const std::array<double, 12>& rows);
 
-/// Reads poses in the format that the first line shows. KITTI's has 12 numbers, also behind a stamp in ns. TUM's is
-/// "stamp[s] tx ty tz qx qy qz qw". EuRoC's is CSV: stamp in ns, x, y, z, qw, qx, qy, qz, …, of the body. Throws
-/// std::runtime_error that names file, line and these formats.
+/// Reads poses in the format that the first lines show. KITTI's has 12 numbers, also behind a stamp. TUM's is "stamp tx
+/// ty tz qx qy qz qw", TartanAir's the same without a stamp. EuRoC's is CSV: stamp in ns, x, y, z, qw, qx, qy, qz, …, of
+/// the body. Other tables are read by a head line that names their columns. Stamps may be in s, ms, µs or ns. Lines of NaN
+/// behind a stamp are left out. Throws std::runtime_error that names file, line and these formats.
 StampedTrajectory readPoses(const std::string& path);
 
 /// Reads KITTI poses (one line of 12 numbers per frame: 3x4, row-major). Throws std::runtime_error that names file and
@@ -87,14 +88,15 @@ std::vector<SubPathErrors> subPathErrors(const Trajectory& ground_truth, const T
 TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajectory& estimate,
                                     const std::vector<double>& lengths = kittiLengths());
 
-/// True poses at these stamps (ns) from a file that readPoses() reads. With stamps in the file they are interpolated,
-/// and none in its gaps; without, it has one pose for each stamp. Throws std::runtime_error that names the file if it
-/// cannot be read or has no pose at the stamps.
-std::vector<std::optional<Eigen::Isometry3d>> readGroundTruth(const std::string& path,
-                                                              const std::vector<std::int64_t>& stamps);
+/// The pose at a stamp (ns), interpolated; none in gaps of more than 0.5 s and outside.
+std::optional<Eigen::Isometry3d> poseAt(const StampedTrajectory& truth, std::int64_t stamp);
 
-/// Corresponding true and estimated poses: by stamps if both files have some, else by lines. Throws std::runtime_error
-/// that names the files if neither is possible.
-std::pair<Trajectory, Trajectory> readComparable(const std::string& ground_truth, const std::string& estimate);
+/// True poses of a recording's pairs from a file that readPoses() reads. With stamps in the file they are those at
+/// `stamps` (ns), and none in its gaps. Without, pair i has the line `numbers`[i] (from 0 on), or `first` lines later if
+/// the file has so many. Throws std::runtime_error that names the file if it cannot be read or has no such pose.
+std::vector<std::optional<Eigen::Isometry3d>> readGroundTruth(const std::string& path,
+                                                              const std::vector<std::int64_t>& stamps,
+                                                              const std::vector<std::size_t>& numbers,
+                                                              std::size_t first = 0);
 
 }  // namespace sdvo
