@@ -55,8 +55,7 @@ void CameraInput::onPair(const MessagePtr& left, const MessagePtr& right, const 
 }
 
 int CameraInput::unused() const {
-  return unusable_ +
-         (approximate_ ? std::max(lefts_ - paired_, 0) : given_up_ + static_cast<int>(exact_.waiting()));
+  return unusable_ + (approximate_ ? std::max(lefts_ - paired_, 0) : given_up_ + static_cast<int>(exact_.waiting()));
 }
 
 std::string CameraInput::problem() {

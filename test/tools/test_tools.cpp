@@ -842,7 +842,7 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
             static_cast<std::size_t>(kPairs));
   json = readPage(page);
   expectWords(json, all);
-  expectWords(json, {"true error", "visual_odometry/motion/seed", "default 1"});
+  expectWords(json, {"true error", "visual_odometry/map/keyframes", "default 8"});
   EXPECT_EQ(YAML::Load(json)["pairs"]["truth"].size(), static_cast<std::size_t>(kPairs));
 
   std::ofstream(root_ / "short.txt") << "1 0 0 0 0 1 0 0 0 0 1 0\n";
