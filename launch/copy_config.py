@@ -55,7 +55,7 @@ def check(value, name):
 
 
 def refuse_unknown_arguments():
-    """Of `roslaunch stereo_descriptor_vo FILE name:=value`, from which roslaunch leaves out names that the file lacks."""
+    """Of `roslaunch stereo_descriptor_vo FILE name:=value`, from which `roslaunch` leaves out names that the file lacks."""
     with open('/proc/%d/cmdline' % os.getppid()) as file:
         words = file.read().split('\0')
     if 'stereo_descriptor_vo' not in words[:-1]:

@@ -283,7 +283,7 @@ class Launch(unittest.TestCase):
         self.assertTrue(wait_until(lambda: not copies() - before), copies() - before)
 
     def test_arguments_that_a_file_lacks_are_refused(self):
-        """By a command line, which roslaunch itself does not check."""
+        """By a command line, which `roslaunch` itself does not check."""
         def refusal(*arguments):
             command = ['roslaunch', '--dump-params', PACKAGE, 'stereo_vo.launch'] + list(arguments)
             return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, universal_newlines=True).stderr
