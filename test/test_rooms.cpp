@@ -218,7 +218,7 @@ TEST(Rooms, NoneOfTheMotionSideIsLarge) {
 /// One thought is one file: few are short. A short header serves more than its own source and one other file, unless
 /// that source is a thought of its own by its length.
 TEST(Rooms, ShortFilesAreFew) {
-  constexpr int kShort = 40, kMost = 45;               // lines; files
+  constexpr int kShort = 40, kMost = 47;               // lines; files
   std::map<std::string, std::set<std::string>> users;  // of a header, by its name without ending
   for (const fs::path& parent : {kSource / "include", kSource / "src", kSource / "test", kSource / "lab"})
     for (const fs::path& file : filesBelow(parent)) {

@@ -76,7 +76,7 @@ class FeaturesImageNodelet : public RobotNodelet {
   void followCamera() {
     ros::master::V_TopicInfo topics;
     std::string ignored;
-    const bool searches = inputs_ && finds_camera_ && (!has_pictures_ || !finder_->names().empty());
+    const bool searches = inputs_ && finds_camera_ && finder_->isSearching(has_pictures_);
     if (!searches || !ros::master::getTopics(topics) || !finder_->update(topics, ignored)) return;
     inputs_.reset();
     updateInputs();

@@ -117,8 +117,8 @@ class Replay(unittest.TestCase):
                 eigenvalues = np.linalg.eigvalsh(matrix)
                 self.assertGreaterEqual(eigenvalues[0], -1e-12 * eigenvalues[-1])
             traces.append(np.trace(np.array(odometry.pose.covariance).reshape(6, 6)))
-        # What one pair is doubted by ends with it; what is open of the rig adds up.
-        self.assertGreater(traces[-1], traces[len(traces) // 5])
+        # What one pair is doubted by ends with it. What is open of the rig adds up, but shrinks as the rig is learnt.
+        self.assertGreater(traces[-1], 0.5 * traces[len(traces) // 5])
 
     def test_twist_is_unknown_at_first_then_that_of_the_ground_truth(self):
         first = np.array(self.odometry[0].twist.covariance).reshape(6, 6)
