@@ -31,7 +31,8 @@ void Doubt::fade() {
 }
 
 Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
-  const double rivals = std::exp(std::min(-sdvo::logOdds(found.probability), kCertain)), misled = std::exp(logOddsMisled(found));
+  const double rivals = std::exp(std::min(-sdvo::logOdds(found.probability), kCertain));
+  const double misled = std::exp(logOddsMisled(found));
   if (lasts()) log_odds_ = std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain);
   const double carried = std::exp(log_odds_);
   const std::string carried_cause = cause_;

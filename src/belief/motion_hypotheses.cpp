@@ -218,7 +218,7 @@ std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypo
 /// The chosen motion's probability, and the moment of the rivals around it.
 void compare(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses,
              const std::vector<RivalMotion>& rivals, MotionHypothesis& chosen) {
-  double largest = 0.0;  // of the chosen one
+  double largest = 0.0;  // of the log-ratios; the chosen motion has 0
   for (const RivalMotion& rival : rivals) largest = std::max(largest, rival.log_ratio);
   double total = std::exp(-largest);
   for (const RivalMotion& rival : rivals) total += std::exp(rival.log_ratio - largest);

@@ -34,11 +34,12 @@ void MountCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isomet
 }
 
 Finding MountCheck::judge(double tilt_sigma) const {
-  constexpr double kEnough = 1.0, kProved = 5.0, kRelevant = 2.0;  // m; standard deviations of the estimate, and before
+  // Chosen: m; standard deviations of the estimate, and of the mount beforehand.
+  constexpr double kEnough = 1.0, kProved = 5.0, kRelevant = 2.0;
   constexpr double kDegree = M_PI / 180.0, kUnknown = 1e6, kMost = 25.0;  // rad; deg: more is another axis
   if (distance_ < kEnough) return {Verdict::kOpen, "too short a way", "drive two metres, with a turn"};
   const double sigma = tilt_sigma * kDegree;
-  constexpr double kNoise = 1e-4, kNoiseTurn = 1e-4;  // m, rad: at least
+  constexpr double kNoise = 1e-4, kNoiseTurn = 1e-4;  // m, rad (chosen): at least
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance = kUnknown * Eigen::Matrix2d::Identity();
   constexpr int kPasses = 3;  // for the weights

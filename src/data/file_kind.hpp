@@ -4,8 +4,8 @@
 
 namespace sdvo {
 
-/// What a file that was meant to be another one is, in words with the remedy, by its first bytes: an HTML page, a
-/// pointer of Git-LFS, a bag of ROS 2, an archive …. Empty: nothing of these, or it cannot be read.
+/// Names a file that cannot be what is wanted, with the remedy, by its first bytes: an HTML page, a pointer of Git-LFS,
+/// a bag of ROS 2, an archive …. Empty: nothing of these, or it cannot be read.
 std::string otherKindOf(const std::string& path);
 /// Of the first bytes of a file.
 std::string otherKindOfBytes(const std::string& begin);

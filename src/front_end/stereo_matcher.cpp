@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kHalfRows = 4;  // block rows above and below the centre at half resolution
 constexpr int kFullRows = 5;  // … and at full resolution
-constexpr int kSame = 2;      // px at half resolution around the best block that count as the same place
+constexpr int kSame = 2;      // px at half resolution (chosen): blocks so near the best one are the same place
 constexpr int kMargin = 64;   // px added around every image, so that no read needs a check
 
 /// The least of the values from `begin` to before `end`.
@@ -167,7 +167,8 @@ class EpipolarSearch {
     const unsigned elsewhere =
         std::min(leastOf(differences.data(), 0, best - kSame), leastOf(differences.data(), best + kSame + 1, count));
     if (least > options_.epipolar.uniqueness * elsewhere) return std::nullopt;
-    // Equal blocks differ by where they lie between pixels, up to this ratio: the best one may be a period off.
+    // The sums of equal blocks differ by where they lie between pixels, up to this ratio (chosen): the best one may be a
+    // period off.
     constexpr unsigned kRival = 2;
     return RowMatch{2 * (best - kNegative), 2 * kRival * least > lowestValley(differences, best).twice_bottom};
   }
@@ -279,8 +280,8 @@ bool isRepeated(const std::vector<std::size_t>& with_rival, const PeriodOf& peri
 /// edges that do not.
 void confirmByUnique(const std::vector<cv::Point2f>& left_positions, const std::vector<std::size_t>& with_rival,
                      std::vector<StereoMatch>& matches) {
-  constexpr std::size_t kFewest = 5, kNearest = 8;
-  constexpr double kAgreeing = 0.75;    // part of the nearest
+  constexpr std::size_t kFewest = 5, kNearest = 8;  // unique matches (chosen)
+  constexpr double kAgreeing = 0.75;                // ratio of the nearest (chosen)
   constexpr float kTolerance = 0.125f;  // periods: a quarter of other surfaces agree by chance
   std::vector<StereoMatch> unique;
   for (std::size_t i = 0; i < matches.size(); ++i)

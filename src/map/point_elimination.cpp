@@ -107,8 +107,8 @@ SDVO_IN_KERNEL void addTimes(const double* columns, const double* vector, double
   }
 }
 
-/// Inverse of the Cholesky factor of a matrix, of which the lower triangle is given. What rounding makes smaller than
-/// `least` becomes that.
+/// Inverse of the Cholesky factor of a matrix, of which the lower triangle is given. Squares on its diagonal are at least
+/// `least`, because rounding may make them negative.
 SDVO_IN_KERNEL void invertRoot(const double (&H)[3][kLanes], const double (&least)[3], double (&R)[3][3]) {
   R[0][1] = R[0][2] = R[1][2] = 0.0;
   R[0][0] = 1.0 / std::sqrt(std::max(H[0][0], least[0]));

@@ -528,7 +528,7 @@ TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
   EXPECT_GE(count[TrackingState::kDegraded], 3) << "a map of the wrong depths explains one another's pairs";
 }
 
-/// What no input may cause is not published: the odometry is lost, says why, and goes on from the last sound pose.
+/// A result with a defect is not published: the odometry is lost, names it, and goes on from the last sound pose.
 TEST(VisualOdometry, ACovarianceThatIsNoneIsLostAndGoesOn) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 8);

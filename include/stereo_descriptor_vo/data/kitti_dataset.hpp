@@ -45,12 +45,13 @@ std::string kittiLayouts();
 bool isKittiLayout(const std::string& directory);
 
 /// One drive of numbered images in two folders, in the layout of KITTI's odometry benchmark (image_0, image_1,
-/// calib.txt, times.txt) or another one of kittiLayouts(). Numbers may begin anywhere. Every error is a std::runtime_error that names the file and what is wrong with it.
+/// calib.txt, times.txt) or another one of kittiLayouts(). Numbers may begin anywhere. Every error is a
+/// std::runtime_error that names the file and its fault.
 ///
 /// The official poses are those of the left grey camera; the left colour camera sits about 6 cm beside it.
 class KittiSequence {
  public:
-  /// What stands for the folder's own files.
+  /// Files and values in place of the folder's own ones.
   struct Override {
     std::vector<std::string> calibration = {};  ///< of raw images, for readCalibration(); none: calib.txt
     double fov = 0.0;                           ///< of the rectified images, deg; 0: as calibrated
