@@ -9,7 +9,7 @@ from .programs import ROOT
 
 PICTURE = ROOT / "docs" / "images" / "layout.svg"
 HEADERS, SOURCES = ROOT / "include" / "stereo_descriptor_vo", ROOT / "src"
-INCLUDE = re.compile(r'^\s*#\s*include\s*[<"](?:\.\./|stereo_descriptor_vo/)([a-z_]+)/')
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 
 # What the includes do not tell: what a room is for, and its place from left (0) to right in the picture.
 ROOMS = {
@@ -37,12 +37,20 @@ COLOURS = {"front_end": "#dcebfa", "places": "#dcebfa", "common": "#e3e0f7", "ro
 
 
 def files_of(room):
-    return [f for parent in (HEADERS, SOURCES) for f in sorted((parent / room).glob("*")) if f.is_file()]
+    return [f for parent in (HEADERS, SOURCES) for f in sorted((parent / room).rglob("*")) if f.is_file()]
+
+
+def room_of(header, includer):
+    """Empty for headers from elsewhere."""
+    public, source = HEADERS.parent / header, (includer.parent / header).resolve()
+    for path, rooms in ((public, HEADERS), (source, SOURCES)):
+        if path.is_file() and rooms in path.parents:
+            return path.relative_to(rooms).parts[0]
+    return ""
 
 
 def includes_of(room, rooms):
-    lines = [line for f in files_of(room) for line in f.read_text().splitlines()]
-    found = {m[1] for line in lines if (m := INCLUDE.match(line))}
+    found = {room_of(header, f) for f in files_of(room) for header in INCLUDE.findall(f.read_text())}
     return {other for other in found if other in rooms and other != room}
 
 

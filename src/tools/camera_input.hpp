@@ -14,9 +14,9 @@
 #include <set>
 #include <string>
 
-#include "../ros/arrival_log.hpp"
-#include "../ros/stereo_input.hpp"
-#include "../ros/synchronisers.hpp"
+#include "../ros/diagnostics/arrival_log.hpp"
+#include "../ros/synchronisation/stereo_input.hpp"
+#include "../ros/synchronisation/synchronisers.hpp"
 #include "pair_reader.hpp"
 #include "recording.hpp"
 #include "stereo_messages.hpp"

@@ -16,7 +16,7 @@
 #include "../check/finding.hpp"
 #include "../common/worker.hpp"
 #include "../messages/stamps.hpp"
-#include "../ros/camera_finder.hpp"
+#include "../ros/synchronisation/camera_finder.hpp"
 #include "camera_check.hpp"
 #include "camera_input.hpp"
 #include "page.hpp"

@@ -28,7 +28,7 @@
 #include "../common/progress.hpp"
 #include "../common/text.hpp"
 #include "../data/euroc_dataset.hpp"
-#include "../ros/output_files.hpp"
+#include "../ros/files/output_files.hpp"
 #include "pair_reader.hpp"
 #include "recording.hpp"
 #include "run_tool.hpp"

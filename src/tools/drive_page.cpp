@@ -12,7 +12,7 @@
 #include "../common/text.hpp"
 #include "../messages/feature_conversions.hpp"
 #include "../messages/odometry_conversions.hpp"
-#include "../ros/features_image.hpp"
+#include "../ros/publishers/features_image.hpp"
 #include "page.hpp"
 #include "stereo_messages.hpp"
 

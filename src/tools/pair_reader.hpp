@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "../data/stereo_rectification.hpp"
-#include "../ros/pair_decoder.hpp"
+#include "../ros/synchronisation/pair_decoder.hpp"
 #include "recording.hpp"
 #include "stereo_messages.hpp"
 

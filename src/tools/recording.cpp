@@ -16,7 +16,7 @@
 #include "../config/interface_options.hpp"
 #include "../data/euroc_dataset.hpp"
 #include "../messages/stamps.hpp"
-#include "../ros/arrival_log.hpp"
+#include "../ros/diagnostics/arrival_log.hpp"
 #include "camera_input.hpp"
 #include "pair_reader.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"

@@ -22,7 +22,7 @@
 #include "../common/text.hpp"
 #include "../data/file_kind.hpp"
 #include "../messages/image_conversions.hpp"
-#include "../ros/camera_finder.hpp"
+#include "../ros/synchronisation/camera_finder.hpp"
 
 namespace sdvo {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "../../src/ros/places_file.hpp"
+#include "../../src/ros/files/places_file.hpp"
 #include "../synthetic_features.hpp"
 #include "fuzz_message.hpp"
 

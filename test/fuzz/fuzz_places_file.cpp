@@ -3,7 +3,7 @@
 #include <rosbag/bag.h>
 #include <std_msgs/Header.h>
 
-#include "../../src/ros/places_file.hpp"
+#include "../../src/ros/files/places_file.hpp"
 #include "../temporary_folder.hpp"
 #include "fuzz_message.hpp"
 #include "fuzz_places.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "../../src/ros/threads.hpp"
+#include "../../src/ros/node/threads.hpp"
 
 namespace sdvo::rostest_callback_thread {
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 
-#include "../../src/ros/image_subscriber.hpp"
+#include "../../src/ros/synchronisation/image_subscriber.hpp"
 
 namespace sdvo::rostest_image_transport {
 

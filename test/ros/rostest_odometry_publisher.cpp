@@ -3,7 +3,7 @@
 #include <sensor_msgs/point_cloud2_iterator.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include "../../src/ros/odometry_publisher.hpp"
+#include "../../src/ros/publishers/odometry_publisher.hpp"
 #include "message_samples.hpp"
 #include "spin.hpp"
 

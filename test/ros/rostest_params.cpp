@@ -3,7 +3,7 @@
 
 #include <tuple>
 
-#include "../../src/ros/params.hpp"
+#include "../../src/ros/node/params.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "../../src/ros/params.hpp"
+#include "../../src/ros/node/params.hpp"
 #include "../comma_locale.hpp"
 #include "../said.hpp"
 

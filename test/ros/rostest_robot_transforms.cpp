@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "../../src/ros/transforms.hpp"
+#include "../../src/ros/transforms/transforms.hpp"
 #include "../said.hpp"
 #include "spin.hpp"
 

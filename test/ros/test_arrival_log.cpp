@@ -2,8 +2,8 @@
 
 #include <random>
 
-#include "../../src/ros/arrival_log.hpp"
-#include "../../src/ros/synchronisers.hpp"
+#include "../../src/ros/diagnostics/arrival_log.hpp"
+#include "../../src/ros/synchronisation/synchronisers.hpp"
 #include "../said.hpp"
 #include "message_samples.hpp"
 

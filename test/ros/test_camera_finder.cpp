@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/camera_finder.hpp"
+#include "../../src/ros/synchronisation/camera_finder.hpp"
 #include "../said.hpp"
 
 namespace sdvo::test_camera_finder {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "../../src/ros/diagnostics.hpp"
+#include "../../src/ros/diagnostics/diagnostics.hpp"
 #include "../said.hpp"
 
 namespace sdvo::test_diagnostics {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/features_image.hpp"
+#include "../../src/ros/publishers/features_image.hpp"
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 

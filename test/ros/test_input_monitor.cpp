@@ -3,7 +3,7 @@
 #include <chrono>
 #include <thread>
 
-#include "../../src/ros/diagnostic_tasks.hpp"
+#include "../../src/ros/diagnostics/diagnostic_tasks.hpp"
 #include "../said.hpp"
 #include "message_samples.hpp"
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/throttles.hpp"
+#include "../../src/ros/node/throttles.hpp"
 
 namespace sdvo::test_patience {
 

@@ -11,7 +11,7 @@
 #include <fstream>
 #include <thread>
 
-#include "../../src/ros/places_file.hpp"
+#include "../../src/ros/files/places_file.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"

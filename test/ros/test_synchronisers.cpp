@@ -5,7 +5,7 @@
 #include <boost/make_shared.hpp>
 #include <vector>
 
-#include "../../src/ros/synchronisers.hpp"
+#include "../../src/ros/synchronisation/synchronisers.hpp"
 
 namespace sdvo::test_synchronisers {
 

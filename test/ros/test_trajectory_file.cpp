@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "../../src/ros/output_files.hpp"
+#include "../../src/ros/files/output_files.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/diagnostic_tasks.hpp"
+#include "../../src/ros/diagnostics/diagnostic_tasks.hpp"
 
 namespace sdvo::test_unused_input {
 

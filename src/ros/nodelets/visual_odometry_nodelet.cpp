@@ -1,0 +1,568 @@
+#include <stereo_descriptor_vo/ResetToPose.h>
+#include <stereo_descriptor_vo/SaveTrajectory.h>
+#include <stereo_descriptor_vo/SetPose.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <pluginlib/class_list_macros.hpp>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../../check/axes_check.hpp"
+#include "../../check/mount_check.hpp"
+#include "../../common/imu_tracks.hpp"
+#include "../../common/stamp_filter.hpp"
+#include "../../common/text.hpp"
+#include "../../common/worker.hpp"
+#include "../../config/interface_options.hpp"
+#include "../../matching/patch_alignment.hpp"
+#include "../../messages/feature_conversions.hpp"
+#include "../../messages/frames.hpp"
+#include "../../messages/pose_conversions.hpp"
+#include "../../messages/stamps.hpp"
+#include "../diagnostics/diagnostics.hpp"
+#include "../files/output_files.hpp"
+#include "../node/throttles.hpp"
+#include "../publishers/odometry_publisher.hpp"
+#include "../transforms/imu_input.hpp"
+#include "../transforms/transforms.hpp"
+#include "robot_nodelet.hpp"
+#include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+
+namespace sdvo {
+
+using ros_conversions::cleanFrameId;
+
+/// Stereo feature messages in; odometry, TF and the state of both out. Never sees an image.
+class VisualOdometryNodelet : public RobotNodelet {
+ public:
+  ~VisualOdometryNodelet() override {
+    stopping_ = true;
+    stopThreads();
+    if (worker_) worker_->stop();
+  }
+
+ private:
+  using FeaturesMessage = stereo_descriptor_vo::StereoFeatures;
+  using FeaturesMessagePtr = stereo_descriptor_vo::StereoFeaturesConstPtr;
+
+  /// A feature message with the time of its arrival, and the number of restarts and resumes by services before it.
+  struct Arrived {
+    FeaturesMessagePtr message;
+    StereoFeaturesView view;
+    std::int64_t now;  ///< ns, simulated or of a steady clock
+    int starts, resumes;
+  };
+  using FeaturesFilter = StampFilter<Arrived>;
+
+  void begin() override {
+    CallbackThread& callbacks = addThread();
+    nh_ = callbacks.serve(getNodeHandle());
+    ros::NodeHandle private_nh = callbacks.serve(getPrivateNodeHandle());
+    ros::NodeHandle slow_nh = addThread().serve(getPrivateNodeHandle());  // services that take their time
+    ros::NodeHandle disk_nh = addThread().serve(getPrivateNodeHandle());  // services that write files
+    loadOptions(private_nh, options_, reconfigured_);
+    if (options_.use_imu && !options_.guess_frame_id.empty())
+      throw std::invalid_argument("use_imu and guess_frame_id exclude each other: set one of them");
+    checkFrames();
+    for (std::string* frame : {&options_.odom_frame_id, &options_.base_frame_id, &options_.guess_frame_id})
+      *frame = cleanFrameId(*frame);
+    T_odom_start_ = ros_conversions::toPose(options_.initial_pose);
+    odometry_ = std::make_unique<VisualOdometry>(reconfigured_);
+    const std::uint32_t tag = TransformPublisher::tagOf(getName());
+    publisher_ = std::make_unique<OdometryPublisher>(nh_, options_, tag);
+    publisher_->restart(T_odom_start_);
+    to_be_levelled_ = options_.use_imu;
+    transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), tag,
+                                                    [this](const std::string& what) { SDVO_WARN(what, what); });
+    mount_ = std::make_unique<CameraMount>(*transforms_, options_.tf_timeout);
+    patience_ = Patience(options_.guess_timeout);
+    unused_ = std::make_unique<UnusedInput>("feature messages", options_.rates.max_unused,
+                                            std::set<int>{UnusedInput::kPushedOut});
+    diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_, *unused_);
+    using namespace stereo_descriptor_vo;
+    serveReset(slow_nh, [this] { startAgain(); });
+    serve<ResetToPose>(slow_nh, "reset_to_pose",
+                       [this](const auto& request, auto&) { startAgain(ros_conversions::toPose(request.pose)); });
+    serve<SetPose>(slow_nh, "set_pose", [this](const auto& request, auto&) { setPose(request.pose); });
+    serve<SaveTrajectory>(disk_nh, "save_trajectory", [this](const auto& request, auto& response) {
+      response.message = save(request.format, inRosHome(request.path));
+    });
+    pose_subscriber_ = slow_nh.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
+        "set_pose", 1, [this](const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose) {
+          try {
+            setPose(*pose);
+          } catch (const std::invalid_argument& e) {
+            NODELET_ERROR_STREAM("set_pose: " << e.what());
+          }
+        });
+
+    VisualOdometryOptions defaults;
+    reconfigure_server_ = std::make_unique<ReconfigureServer>(
+        slow_nh, listOptions(reconfigured_),
+        [this] {
+          VisualOdometry{reconfigured_};  // throws when they do not go together
+          reconfigurations_.post(reconfigured_);
+        },
+        listOptions(defaults));
+
+    if (options_.use_imu)
+      imu_ = std::make_unique<ImuInput>(nh_, *transforms_, *unused_,
+                                        [this](const std::string& what) { SDVO_WARN(what, what); });
+    worker_ = std::make_unique<Worker<FeaturesFilter::Passed>>(
+        static_cast<std::size_t>(options_.queue_size),
+        [this](const FeaturesFilter::Passed& passed) { process(passed); });
+    // Without a subscriber the image side rests, too.
+    input_ = std::make_unique<PausableInput>([this] { return subscribe(); }, [this] { resumes_.post({}); });
+    servePauses(private_nh, *input_, diagnostics_->input(), "the motion in between is unknown");
+  }
+
+  std::vector<ros::Subscriber> subscribe() {
+    const auto queue = static_cast<std::uint32_t>(std::max(kArrivalQueue, options_.queue_size));
+    return {nh_.subscribe<FeaturesMessage>(
+        "stereo_features", queue, [this](const FeaturesMessagePtr& m) { onFeatures(m); }, ros::VoidConstPtr(),
+        ros::TransportHints().tcpNoDelay())};
+  }
+
+  void checkFrames() const {
+    ros_conversions::requireTwoFrames({"odom_frame_id", options_.odom_frame_id},
+                                      {"base_frame_id", options_.base_frame_id});
+    if (options_.guess_frame_id.empty()) return;
+    ros_conversions::requireTwoFrames({"guess_frame_id", options_.guess_frame_id},
+                                      {"base_frame_id", options_.base_frame_id});
+    if (options_.publish_tf)  // its own pose
+      ros_conversions::requireTwoFrames({"guess_frame_id", options_.guess_frame_id},
+                                        {"odom_frame_id", options_.odom_frame_id});
+  }
+
+  /// Parent and child of the transform that is published on TF.
+  std::optional<ros_conversions::OdometryFrames> publishedFrames() const {
+    if (!options_.publish_tf) return std::nullopt;
+    ros_conversions::OdometryFrames frames{
+        options_.odom_frame_id, options_.correctsGuess() ? options_.guess_frame_id : options_.base_frame_id};
+    if (options_.invert_tf) std::swap(frames.odom, frames.base);
+    return frames;
+  }
+
+  void onFeatures(const FeaturesMessagePtr& message) try {
+    if (input_->isPaused()) return;
+    const std::uint64_t now = ros::Time::isSimTime() ? ros::Time::now().toNSec() : ros::SteadyTime::now().toNSec();
+    Arrived arrived{message, check(*message), static_cast<std::int64_t>(now), starts_, resumes_.posted()};
+    const std::uint64_t late = filter_.dropped();
+    const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
+    std::vector<FeaturesFilter::Passed> passed =
+        filter_.add(std::move(arrived), nanoseconds(message->header.stamp), nanoseconds(ros::Time::now()), new_stream);
+    // The first of two was held until the next one confirmed its stamp, perhaps by the image side, too. So it arrived
+    // late: it is dated back to the next one's arrival less the difference of their stamps.
+    if (passed.size() == 2) {
+      Arrived &held = passed[0].item, &next = passed[1].item;
+      const auto stamp = [](const Arrived& item) { return nanoseconds(item.message->header.stamp); };
+      held.now = std::min(held.now, next.now - (stamp(next) - stamp(held)));
+    }
+    for (FeaturesFilter::Passed& item : passed)
+      if (!worker_->push(std::move(item))) unused_->add(UnusedInput::kPushedOut);
+    stream_epoch_ = message->stream_epoch;
+    unused_->add(UnusedInput::kLate, filter_.dropped() - late);
+    if (filter_.dropped() > late)
+      SDVO_WARN("late", "features near " << message->header.stamp << " are late or have a wrong stamp: dropped ("
+                                         << filter_.dropped()
+                                         << " so far); if this goes on, check the driver's stamps");
+  } catch (const std::exception& e) {
+    SDVO_ERROR(e.what(), "features at " << message->header.stamp << " skipped: " << e.what());
+  }
+
+  /// Throws for a message that cannot be used, before filter_ takes its stamp.
+  StereoFeaturesView check(const FeaturesMessage& message) try {
+    const std::string problem = whyUnusable(message.header.stamp);
+    if (!problem.empty()) throw std::invalid_argument(problem);
+    return StereoFeaturesView(message);
+  } catch (const std::invalid_argument&) {
+    unused_->add(UnusedInput::kRefused);
+    throw;
+  }
+
+  /// In the worker's thread.
+  void process(const FeaturesFilter::Passed& passed) try {
+    const Guess guess = waitForOthers(passed);
+    const std::lock_guard<std::mutex> lock(work_mutex_);
+    if (passed.item.starts != starts_) return;
+    const WorkLoad::Item work(diagnostics_->load());
+    publishInfo(estimate(passed, guess), *passed.item.message);
+    unused_->noteUsed();
+  } catch (const std::exception& e) {
+    NODELET_ERROR_STREAM("features at " << passed.item.message->header.stamp << ": no vo_info: " << e.what());
+  }
+
+  /// A motion since the pair of this time, if any.
+  struct Guess {
+    std::optional<ros::Time> since;
+    std::optional<MotionGuess> motion;
+  };
+
+  /// Waits for the camera's mount on TF and for a guess by another odometry or the gyro. Without the lock, which
+  /// services need.
+  Guess waitForOthers(const FeaturesFilter::Passed& passed) {
+    const std_msgs::Header& header = passed.item.message->header;
+    const auto isVoid = [&] { return stopping_ || passed.item.starts != starts_; };
+    const std::string camera_frame = cleanFrameId(header.frame_id);
+    const double begin = steadyTime();
+    // With a full queue the next pair would be dropped: stop waiting.
+    mount_->await(options_.base_frame_id, camera_frame, [&] { return isVoid() || worker_->isFull(); });
+    diagnostics_->load().noteWait("the transform base <- camera", steadyTime() - begin);
+    Guess guess;
+    {
+      const std::lock_guard<std::mutex> lock(work_mutex_);
+      const bool is_trusted = !options_.guess_frame_id.empty() || !gyro_found_.isFault();
+      if (is_trusted) guess.since = processed_stamp_;
+    }
+    if (guess.since && mount_->last()) guess.motion = findGuess(*guess.since, header, isVoid);
+    return guess;
+  }
+
+  /// Publishes everything of a pair but vo_info.
+  OdometryResult estimate(const FeaturesFilter::Passed& passed, const Guess& guess) try {
+    const FeaturesMessage& message = *passed.item.message;
+    if (const auto options = reconfigurations_.take()) odometry_->configure(*options);
+    noteJumps(passed);
+    if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
+    StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
+    features.stamp += time_shift_;
+    std::string problem = findExtrinsic(cleanFrameId(message.header.frame_id));
+    if (problem.empty() && to_be_levelled_ && !given_start_) problem = level();
+    const OdometryResult result = problem.empty() ? track(features, message, guess) : waitFor(problem);
+    publisher_->publishPoints(passed.item.view);
+    publisher_->publishFlow(result, features, message.header);
+    return result;
+  } catch (const std::exception& e) {
+    SDVO_ERROR(e.what(), "features at " << passed.item.message->header.stamp << " skipped: " << e.what());
+    return waitFor(std::string("features skipped: ") + e.what());
+  }
+
+  /// If simulated time jumps back (a bag is played again), the odometry restarts. If stamps jump to either side, the
+  /// camera's or system's clock was set: the interval of the pairs is that of their arrivals.
+  void noteJumps(const FeaturesFilter::Passed& passed) {
+    constexpr std::int64_t kJump = 1000000000, kLeast = 1000000;  // ns: as the filter's; between two pairs
+    const std::int64_t stamp = nanoseconds(passed.item.message->header.stamp), now = passed.item.now;
+    const auto before = std::exchange(last_arrival_, std::pair(stamp, now));
+    const bool source_restarted = std::exchange(source_restarts_, passed.source_restarts) != passed.source_restarts;
+    const bool clock_set = std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps;
+    if (clock_set && ros::Time::isSimTime()) return restart("the clock jumped back");
+    if (!before) return;
+    const std::int64_t step = stamp - before->first, passed_time = std::max(now - before->second, kLeast);
+    if (step > 0 && (step <= kJump || std::abs(step - passed_time) <= kJump)) return;
+    NODELET_WARN_STREAM((clock_set          ? "the system's clock was set back"
+                         : source_restarted ? "the stamps of the features jumped back"
+                                            : "the stamps of the features jumped ahead")
+                        << " to " << passed.item.message->header.stamp << ": the odometry goes on, "
+                        << 1e-9 * static_cast<double>(passed_time) << " s after the pair before");
+    time_shift_ += passed_time - step;
+    processed_stamp_.reset();
+  }
+
+  OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message, const Guess& guess) {
+    if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
+    processed_epoch_ = message.stream_epoch;
+    const std::string complaint = PatchAlignmentOptions().complaint(features.patch_layout.side);
+    if (!complaint.empty()) SDVO_WARN("patches", complaint);
+    odometry_->mountAt(*mount_->last());
+    const std::optional<MotionGuess> motion = guess.since == processed_stamp_ ? guess.motion : std::nullopt;  // no jump
+    OdometryResult result = odometry_->update(features, motion);
+    result.stamp = nanoseconds(message.header.stamp);
+    if (result.state == TrackingState::kTracking && result.has_motion) compareAxes(result, motion, message.header);
+    processed_stamp_ = message.header.stamp;
+    epoch_ = result.epoch;
+    report(result, message.header.stamp);
+    std::optional<Eigen::Isometry3d> T_guess_base;
+    if (std::string ignored; options_.correctsGuess())
+      T_guess_base = transforms_->find(options_.guess_frame_id, options_.base_frame_id, ignored, message.header.stamp);
+    publisher_->publish(result, *mount_->last(), T_guess_base);
+    if (publisher_->wantsMap() && result.has_pose)
+      publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
+    return result;
+  }
+
+  /// Compares the axes of camera and IMU on TF with the motion in the images.
+  void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess,
+                   const std_msgs::Header& header) {
+    const auto warnOnce = [this](const char* step, Finding& last, const Finding& found, const char* consequence) {
+      if (!std::exchange(last, found).isFault() && found.isFault())
+        NODELET_WARN_STREAM(step << ": " << found.text() << consequence);
+    };
+    if (!base_is_camera_) optical_axis_.add(*mount_->last(), result.T_previous_current);
+    warnOnce("axes", optical_found_, optical_axis_.judge(), "");
+    mount_check_.add(*mount_->last(), result.T_previous_current);
+    if (const PlanarOptions& floor = odometry_->options().planar; floor.planar && !mount_found_.isFault())
+      warnOnce("mount", mount_found_, mount_check_.judge(floor.planar_tilt_sigma), "");
+    constexpr double kSame = 1e-3;  // s: after an outage the motion is of another time than the guess
+    if (!guess || !guess->rotation_only ||
+        std::abs(secondsBetween(*processed_stamp_, header.stamp) - result.dt) > kSame)
+      return;
+    gyro_axes_.add(nanoseconds(*processed_stamp_), nanoseconds(header.stamp), guess->T_previous_current.linear(),
+                   result.T_previous_current.linear());
+    const auto gyro = [&](std::int64_t from, std::int64_t to) {
+      std::string ignored;
+      return imu_->rotation(cleanFrameId(header.frame_id), from, to, ignored);
+    };
+    warnOnce("IMU", gyro_found_, gyro_axes_.judge(gyro), " No guess is taken from it until a reset");
+  }
+
+  OdometryResult waitFor(const std::string& what) const {
+    OdometryResult waiting;
+    waiting.reason = what;
+    waiting.epoch = epoch_;
+    return waiting;
+  }
+
+  void publishInfo(const OdometryResult& result, const FeaturesMessage& message) {
+    stereo_descriptor_vo::VoInfo info = ros_conversions::toInfo(result, message);
+    info.dropped_features = unused_->count(UnusedInput::kPushedOut);
+    info.out_of_order = unused_->count(UnusedInput::kLate);
+    info.malformed = unused_->count(UnusedInput::kRefused);
+    info = publisher_->publishInfo(std::move(info), message.header.stamp);
+    diagnostics_->note(info);
+    if (std::abs(info.latency) > kOtherClock && !std::exchange(latency_reported_, true))
+      NODELET_WARN_STREAM(checkLatency(info.latency, kOtherClock).text());
+  }
+
+  void report(const OdometryResult& result, const ros::Time& stamp) {
+    const bool is_lost = result.state == TrackingState::kWaiting || result.state == TrackingState::kLost;
+    if (result.state == TrackingState::kTracking) {
+      if (is_tracking_ || !throttle_.allows("begins")) return;
+      is_tracking_ = true;
+      // The first pair has features and no matches yet.
+      NODELET_INFO_STREAM("TRACKING at " << stamp << ", epoch " << result.epoch << ": "
+                                         << (result.has_motion ? result.inliers : result.features) << " points");
+      return;
+    }
+    if (is_lost) is_tracking_ = false;
+    // A restart is a kind of its own, or the throttle would drop it as one of the predictions before it.
+    const bool started_again = result.has_pose && !result.has_motion;
+    SDVO_WARN(started_again ? "started again" : toString(result.state),
+              toString(result.state) << " at " << stamp << ", epoch " << result.epoch << ", " << result.inliers
+                                     << " of " << result.matches << " points: " << result.reason);
+  }
+
+  /// At a given pose of the base, or at the initial one.
+  void restart(const char* why, const std::optional<Eigen::Isometry3d>& given = std::nullopt) {
+    const Eigen::Isometry3d T_odom_start = given.value_or(T_odom_start_);
+    NODELET_WARN_STREAM(
+        why << ": the odometry starts again from "
+            << (T_odom_start.isApprox(Eigen::Isometry3d::Identity()) ? "the origin" : "the given pose"));
+    odometry_->reset();
+    time_shift_ = 0;
+    mount_->forget();
+    optical_axis_ = {};
+    gyro_axes_ = {};
+    mount_check_ = {};
+    optical_found_ = gyro_found_ = mount_found_ = {};
+    publisher_->restart(T_odom_start);
+    given_start_ = given.has_value();
+    levels_until_.reset();
+    processed_epoch_.reset();
+    processed_stamp_.reset();
+  }
+
+  /// The camera's motion since the previous pair by another odometry or the gyro; nothing if neither is enabled or has
+  /// it.
+  std::optional<MotionGuess> findGuess(const ros::Time& since, const std_msgs::Header& header,
+                                       const std::function<bool()>& is_void) {
+    const bool of_frame = !options_.guess_frame_id.empty();
+    if (!of_frame && !(imu_ && imu_->hasRates())) return std::nullopt;
+    std::string problem;
+    std::optional<MotionGuess> guess;
+    const double now = steadyTime(), give_up = now + patience_.timeout(now);
+    for (;;) {
+      guess = of_frame ? guessOfFrame(since, header.stamp, problem) : guessOfGyro(since, header, problem);
+      if (guess || steadyTime() >= give_up || is_void() || !ros::ok()) break;
+      ros::WallDuration(0.002).sleep();
+    }
+    patience_.note(guess.has_value(), now);
+    diagnostics_->load().noteWait("the guess of the motion", steadyTime() - now);
+    if (guess) return guess;
+    unused_->add(UnusedInput::kNoGuess);
+    SDVO_WARN("guess", "no guess of the motion until " << header.stamp << ", going on without: " << problem);
+    return std::nullopt;
+  }
+
+  static double steadyTime() { return ros::SteadyTime::now().toSec(); }
+
+  std::optional<MotionGuess> guessOfFrame(const ros::Time& since, const ros::Time& stamp, std::string& problem) const {
+    const std::optional<Eigen::Isometry3d> T_before_now =
+        transforms_->findMotion(options_.guess_frame_id, options_.base_frame_id, since, stamp, problem);
+    if (!T_before_now) return std::nullopt;
+    const Eigen::Isometry3d T_base_camera = *mount_->last();
+    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera, false, options_.guess_error};
+  }
+
+  std::optional<MotionGuess> guessOfGyro(const ros::Time& since, const std_msgs::Header& header,
+                                         std::string& problem) const {
+    const std::optional<Eigen::Matrix3d> R_before_now =
+        imu_->rotation(cleanFrameId(header.frame_id), nanoseconds(since), nanoseconds(header.stamp), problem);
+    if (!R_before_now) return std::nullopt;
+    MotionGuess guess;
+    guess.T_previous_current.linear() = *R_before_now;
+    guess.rotation_only = true;
+    return guess;
+  }
+
+  /// Takes roll and pitch of the first pose from the accelerometer, if the robot stands. That needs a second of
+  /// measurements, for which it waits 2 s. Returns what is missing; empty when done.
+  std::string level() {
+    constexpr double kPatience = 2.0;  // s of wall time
+    const double now = steadyTime();
+    if (!levels_until_) levels_until_ = now + kPatience;
+    std::string problem;
+    auto up = imu_->up(options_.base_frame_id, problem);
+    constexpr double kSteep = 0.7;  // cosine of 45 degrees, between robots on slopes and another mounting (chosen)
+    if (up && up->dot(T_odom_start_.linear().transpose() * Eigen::Vector3d::UnitZ()) < kSteep) {
+      problem = text(2, "by its accelerometer the base is tilted from there, its up is ", up->x(), " ", up->y(), " ",
+                     up->z(), ": is the IMU mounted as TF has its frame? Else give this tilt in initial_pose");
+      up.reset();
+      levels_until_ = now;
+    }
+    if (!up && now < *levels_until_) return "roll and pitch of the first pose: " + problem;
+    to_be_levelled_ = false;
+    if (up) {
+      T_odom_start_ = levelled(T_odom_start_, *up);
+      publisher_->restart(T_odom_start_);
+    } else {
+      NODELET_WARN_STREAM("roll and pitch of the first pose are those of initial_pose: " << problem);
+    }
+    return "";
+  }
+
+  /// Finds the camera's pose on the robot. Returns what is missing; empty if it is known.
+  std::string findExtrinsic(const std::string& camera_frame) {
+    const std::string& base_frame = options_.base_frame_id;
+    if (mount_->knows(base_frame, camera_frame)) {
+      if (const std::string change = mount_->change(); !change.empty())
+        NODELET_WARN_STREAM("TF: " << change << "; the odometry holds on to the transform that it began with. A camera "
+                                   << "on a joint needs a base_frame_id that moves with it; after a new calibration of "
+                                   << "the mount call reset");
+      return "";
+    }
+    std::string problem;
+    if (const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem)) {
+      if (const Finding mount = checkMount(base_frame, camera_frame, *found); mount.isFault())
+        NODELET_WARN_STREAM(mount.remedy);
+      if (base_frame == camera_frame && !std::exchange(base_is_camera_, true)) {
+        T_odom_start_ = T_odom_start_ * ros_conversions::bodyToOptical();
+        if (!given_start_) publisher_->restart(T_odom_start_);
+      }
+      if (!camera_frame_.empty() && camera_frame_ != camera_frame)
+        NODELET_WARN_STREAM("the images' frame was '" << camera_frame_ << "' and is '" << camera_frame
+                                                      << "' now: another camera goes on from the base's last pose "
+                                                      << "(epoch + 1)");
+      camera_frame_ = camera_frame;
+      return "";
+    }
+    const std::string report = transforms_->explainMissing(base_frame, camera_frame);
+    SDVO_ERROR("extrinsic", report << ". " << problem);
+    return report;
+  }
+
+  // The services. They answer when the effect is there. Features that wait in the queue are dropped.
+
+  void startAgain(const std::optional<Eigen::Isometry3d>& T_odom_base = std::nullopt) {
+    const std::lock_guard<std::mutex> lock(work_mutex_);
+    ++starts_;
+    restart("reset was called", T_odom_base);
+  }
+
+  /// Sets the base's pose in odom, with its covariance, at the newest pair. Throws std::invalid_argument.
+  void setPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
+    const std::string frame = cleanFrameId(message.header.frame_id);
+    if (frame != options_.odom_frame_id)
+      throw std::invalid_argument("the pose is in frame '" + frame + "', not in odom_frame_id");
+    Eigen::Isometry3d T_odom_base;
+    Matrix6d covariance;
+    ros_conversions::fromMessage(message.pose, T_odom_base, covariance);
+    const std::lock_guard<std::mutex> lock(work_mutex_);
+    const std::optional<Eigen::Isometry3d> T_base_camera = mount_->last();
+    if (!T_base_camera)
+      throw std::invalid_argument("there is no pose yet: set initial_pose, or wait for the first pair");
+    const Matrix6d to_camera = adjoint(T_base_camera->inverse());
+    odometry_->takePose(to_camera * covariance * to_camera.transpose());
+    const Eigen::Isometry3d T_start_base = *T_base_camera * odometry_->lastPose() * T_base_camera->inverse();
+    publisher_->moveTo(T_odom_base * T_start_base.inverse());
+    given_start_ = true;
+  }
+
+  /// Returns the number of poses and the file in words.
+  std::string save(const std::string& format, const std::string& file) {
+    const nav_msgs::Path path = publisher_->path();
+    if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
+    if (!options_.overwrite && saved_.count(file) == 0 && std::filesystem::exists(file))
+      throw std::runtime_error("'" + file +
+                               "' was there before: give another path, or set visual_odometry/overwrite at the start");
+    saveTrajectory(path, *mount_->last(), format, file);
+    saved_.insert(file);
+    return std::to_string(path.poses.size()) + " poses in '" + file + "'";
+  }
+
+  static constexpr double kOtherClock = 3600.0;  // s of latency, more than any slow machine has
+  /// Queue of the subscriber (messages). The callback only stores them.
+  static constexpr int kArrivalQueue = 20;
+
+  ros::NodeHandle nh_;
+  OdometryOutputOptions options_;
+  VisualOdometryOptions reconfigured_;  // the server's
+  Requests<VisualOdometryOptions> reconfigurations_;
+  std::unique_ptr<ReconfigureServer> reconfigure_server_;
+  std::unique_ptr<RobotTransforms> transforms_;
+  std::unique_ptr<CameraMount> mount_;
+  std::unique_ptr<UnusedInput> unused_;
+  std::unique_ptr<ImuInput> imu_;  // none without use_imu
+  std::unique_ptr<OdometryPublisher> publisher_;
+  std::unique_ptr<OdometryDiagnostics> diagnostics_;
+  ros::Subscriber pose_subscriber_;
+  std::set<std::string> saved_;  // trajectories' files
+  struct Resume {};
+  std::atomic<int> starts_{0};  // by services
+  Requests<Resume> resumes_;
+  std::atomic<bool> stopping_{false};
+
+  // Only the callbacks' thread touches these.
+  FeaturesFilter filter_;
+  std::optional<std::uint32_t> stream_epoch_;
+
+  // The worker's thread touches these, and services do.
+  std::mutex work_mutex_;
+  std::unique_ptr<VisualOdometry> odometry_;
+  Eigen::Isometry3d T_odom_start_;  // of a run
+  int source_restarts_ = 0, clock_steps_ = 0;
+  std::optional<std::pair<std::int64_t, std::int64_t>> last_arrival_;  // stamp and arrival of the last pair, ns
+  std::int64_t time_shift_ = 0;  // ns, from stamps to times of the odometry, which never jump
+  int epoch_ = 0;
+  bool is_tracking_ = false;  // TRACKING was reported, and no LOST since
+  std::string camera_frame_;
+  std::optional<std::uint32_t> processed_epoch_;
+  std::optional<ros::Time> processed_stamp_;
+  bool to_be_levelled_ = false;  // T_odom_start_ still needs the accelerometer
+  bool latency_reported_ = false;
+  bool base_is_camera_ = false;         // the base has optical axes, those of odom are REP-105's
+  bool given_start_ = false;            // a service has set the pose, which is not levelled
+  std::optional<double> levels_until_;  // s, steady time
+  Patience patience_{0.0};              // with guesses
+  OpticalAxisCheck optical_axis_;
+  GyroAxesCheck gyro_axes_;
+  MountCheck mount_check_;
+  Finding optical_found_{}, gyro_found_{}, mount_found_{};  // as reported last
+
+  std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
+  std::unique_ptr<PausableInput> input_;
+};
+
+}  // namespace sdvo
+
+PLUGINLIB_EXPORT_CLASS(sdvo::VisualOdometryNodelet, nodelet::Nodelet)

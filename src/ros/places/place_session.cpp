@@ -1,0 +1,158 @@
+#include "place_session.hpp"
+
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "../../common/text.hpp"
+#include "../../messages/feature_conversions.hpp"
+#include "../../messages/frames.hpp"
+#include "../../messages/odometry_conversions.hpp"
+#include "../../messages/pose_conversions.hpp"
+#include "../../messages/stamps.hpp"
+
+namespace sdvo {
+
+PlaceSession::PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces saved)
+    : localises_only_(options.localisation_only), recognition_(options), stream_(saved.stream), located_(false) {
+  recognition_.restore(std::move(saved.places), saved.graph);
+  loaded_ = recognition_.places().rbegin()->first + 1;
+}
+
+PlaceSession::Time PlaceSession::noteTime(const ros::Time& stamp, const ros::Time& now, bool is_simulated) {
+  clock_fell_ |= last_now_ && now < *last_now_;
+  last_now_ = now;
+  if (last_ && stamp == last_->stamp) return Time::kStands;
+  const bool falls = last_ && stamp < last_->stamp;
+  // A pair that waited while the clock jumped back still has a stamp of the earlier time, ahead of the clock.
+  const bool is_of_new_time = falls || stamp <= now + ros::Duration(1.0);
+  if (!last_ || !(falls || (clock_fell_ && is_simulated && is_of_new_time))) return Time::kGoesOn;
+  continues_ = false;
+  return std::exchange(clock_fell_, false) && is_simulated ? Time::kBeganAnew : Time::kFell;
+}
+
+std::optional<PlaceReport> PlaceSession::observe(const OdometryPair& pair, const Eigen::Isometry3d& T_base_camera) {
+  const StereoFeatures features = ros_conversions::fromMessage(*pair.features);
+  const auto kind = features.count() > 0 ? std::optional(features.kind()) : kind_;
+  refuse(features.camera, kind);
+  kind_ = kind;
+  const ros::Time stamp = pair.features->header.stamp;
+  const Eigen::Isometry3d T_odom_base = ros_conversions::toPose(pair.odometry->pose.pose);
+  if (const auto expected = std::exchange(expected_, std::nullopt); expected && !recognition_.places().empty()) {
+    recognition_.expect(expected->T_map_base * T_odom_base.inverse(), expected->radius);
+    located_ = false;
+    pose_given_ = true;
+  }
+  CameraMotion motion;
+  motion.T_odom_camera = T_odom_base * T_base_camera;
+  motion.continuous = continues_ && last_ && pair.info->session == last_->session && pair.info->epoch == last_->epoch &&
+                      pair.resumes == last_->resumes;
+  if (motion.continuous)
+    motion.covariance =
+        ros_conversions::toMotionCovariance(*pair.odometry, secondsBetween(last_->stamp, stamp), T_base_camera);
+  std::optional<PlaceReport> report = recognition_.observe(features, motion);
+  last_ = {stamp, pair.info->session, pair.info->epoch, pair.resumes, features.camera, T_odom_base};
+  continues_ = true;
+  odom_frame_ = ros_conversions::cleanFrameId(pair.odometry->header.frame_id);
+  stream_ = ros_conversions::streamOf(*pair.features);
+  if (report && report->loop) located_ |= loaded_ == 0 || *report->same < loaded_;
+  return report;
+}
+
+std::string PlaceSession::expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame) {
+  constexpr double kLeast = 5.0;   // m: a click in rviz is no better (chosen)
+  constexpr double kSigmas = 3.0;  // standard deviations
+  const std::string frame = ros_conversions::cleanFrameId(pose.header.frame_id);
+  if (frame != map_frame)
+    throw std::invalid_argument("it is in frame '" + frame + "'; publish it in the map's, '" + map_frame +
+                                "' (rviz: Fixed Frame)");
+  const double variance = std::max(pose.pose.covariance[0], pose.pose.covariance[7]);
+  if (!std::isfinite(variance)) throw std::invalid_argument("its covariance is not finite");
+  const Eigen::Isometry3d T_map_base = ros_conversions::toPose(pose.pose.pose);
+  expected_ = {T_map_base, kLeast + kSigmas * std::sqrt(std::max(0.0, variance))};
+  if (!last_ || !isPlaced()) return "the robot is placed in the map";
+  const Eigen::Isometry3d moved = (recognition_.T_map_odom() * last_->T_odom_base).inverse() * T_map_base;
+  return text(2, "the robot is moved in the map, by ", moved.translation().norm(), " m and ",
+              180.0 / M_PI * Eigen::AngleAxisd(moved.linear()).angle(), " deg");
+}
+
+void PlaceSession::refuseOtherCameraThan(const PlaceSession& session) const {
+  if (session.last_) refuse(session.last_->camera, session.kind_);
+}
+
+void PlaceSession::refuse(const StereoCamera& camera, const std::optional<DescriptorKind>& kind) const {
+  if (recognition_.places().empty()) return;
+  const StereoFeatures& known = recognition_.places().begin()->second.features;
+  if (!known.camera.isLike(camera))
+    throw std::invalid_argument("the places are of another camera: load_places of this one, or reset without any");
+  if (kind && *kind != known.kind())
+    throw std::invalid_argument("the places are described by " + toString(known.kind()) + ", not by " +
+                                toString(*kind) + ": load_places of these, or reset without any");
+}
+
+ros_conversions::MapState PlaceSession::map() const {
+  ros_conversions::MapState state{recognition_.graph(), {}};
+  for (const auto& [id, place] : recognition_.places()) state.stamps[id] = place.features.stamp;
+  return state;
+}
+
+SavedPlaces PlaceSession::saved() const {
+  SavedPlaces saved{{}, recognition_.graph(), stream_};
+  for (const auto& [id, place] : recognition_.places()) saved.places.push_back(place);
+  return saved;
+}
+
+std::optional<stereo_descriptor_vo::Place> PlaceSession::message(int id, const std::string& robot) const {
+  const auto place = recognition_.places().find(id);
+  if (place == recognition_.places().end()) return std::nullopt;
+  return ros_conversions::toMessage(place->second, robot, stream_);
+}
+
+std::optional<stereo_descriptor_vo::PlaceSignature> PlaceSession::signature(int id, const std::string& robot) const {
+  const auto place = recognition_.places().find(id);
+  if (place == recognition_.places().end()) return std::nullopt;
+  return ros_conversions::toMessage(recognition_.signature(id), place->second, robot, stream_.frame_id);
+}
+
+stereo_descriptor_vo::PlaceInfo PlaceSession::info(const PlaceReport& report) const {
+  stereo_descriptor_vo::PlaceInfo info = ros_conversions::toInfo(report);
+  info.optimise_time = static_cast<float>(optimise_time);
+  info.located = located_;
+  info.places = static_cast<std::uint32_t>(recognition_.places().size());
+  info.loops = static_cast<std::uint32_t>(recognition_.graph().loops());
+  info.bytes = recognition_.bytes();
+  info.turn_error = static_cast<float>(recognition_.graph().turnError());
+  info.map_to_odom = tf2::eigenToTransform(recognition_.T_map_odom()).transform;
+  return info;
+}
+
+std::optional<geometry_msgs::PoseWithCovarianceStamped> PlaceSession::basePose(
+    const Eigen::Isometry3d& T_base_camera) const {
+  const std::optional<Matrix6d> of_camera = recognition_.covariance();
+  if (!of_camera) return std::nullopt;
+  const Eigen::Isometry3d T_map_base = recognition_.graph().nodes().rbegin()->second * T_base_camera.inverse();
+  const Matrix6d to_base = adjoint(T_base_camera);
+  geometry_msgs::PoseWithCovarianceStamped pose;
+  pose.pose = ros_conversions::toMessage(T_map_base, to_base * *of_camera * to_base.transpose());
+  return pose;
+}
+
+std::vector<PlaceCandidate> PlaceSession::find(const stereo_descriptor_vo::PlaceSignature& signature) const {
+  if (recognition_.places().empty()) return {};
+  const DescriptorKind kind = recognition_.places().begin()->second.features.kind();
+  return recognition_.find(ros_conversions::fromMessage(signature, kind));
+}
+
+std::optional<stereo_descriptor_vo::PlaceMatch> PlaceSession::verify(int id, const Place& other) const {
+  const auto mine = recognition_.places().find(id);
+  if (mine == recognition_.places().end()) return std::nullopt;
+  const PlaceMatch match = recognition_.verify(id, other.features);
+  if (!match.same) return std::nullopt;
+  return ros_conversions::toMessage(match, mine->second, other, stream_.frame_id);
+}
+
+}  // namespace sdvo
