@@ -89,6 +89,9 @@ struct MotionHypothesis {
   int sightingsOf(int match) const;
   bool isLasting(int match) const { return sightingsOf(match) >= kLastingSightings; }
 
+  /// Whether there is a motion, and most matches agree with it.
+  bool isOfMajority() const { return motion.success && 2 * agreement.inliers > agreement.matches; }
+
   /// Features of the pair that the inliers matched, without the rejected ones.
   std::vector<int> inlierFeatures(const std::vector<int>& rejected = {}) const;
 

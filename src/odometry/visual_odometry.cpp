@@ -304,6 +304,7 @@ void VisualOdometry::Impl::compensate(Pair& pair) const {
   const LearntRig& rig = state_.rig;
   const bool is_new = pair.rotation.log_odds > 0.0;
   const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + pair.rotation.value) : rig.rotation;
+  pair.rotated_back.reset();
   if (!rotation.isZero()) pair.rotated_back = rotatedBack(pair.part(), rotation);
   const bool has_map = pair.is == Pair::kFollowed || pair.is == Pair::kSought;
   if (has_map && state_.prior.velocity() && pair.dt <= options_.tracking.max_gap)
@@ -311,7 +312,8 @@ void VisualOdometry::Impl::compensate(Pair& pair) const {
 }
 
 /// Searches the pair's motion in the map, after an outage also in the seed. If the camera turns otherwise than
-/// expected, or the right one seems to have rotated, features are compensated again and the search is repeated.
+/// expected, or the right one seems to have rotated, features are compensated again and the search is repeated. Without
+/// a motion of most matches, a yaw of the right camera is tried; it is kept if more matches agree.
 void VisualOdometry::Impl::search(Pair& pair, const std::optional<MotionGuess>& guess,
                                   std::optional<MotionScene>& scene, MotionHypothesis& found) const {
   const auto find = [&] {
@@ -334,11 +336,25 @@ void VisualOdometry::Impl::search(Pair& pair, const std::optional<MotionGuess>& 
     pair.synchronised = synchronised(pair.taken(), pair.dt, velocity);
     return find();
   };
-  const Vector6d velocity = findSynchronised();
-  const Eigen::Vector3d turn = pair.dt * velocity.tail<3>();
-  const Eigen::Vector3d before = pair.dt * state_.prior.velocity().value_or(Vector6d::Zero()).tail<3>();
-  const Eigen::Matrix3d turns = turn * turn.transpose() + before * before.transpose();
-  pair.rotation = state_.rig.shownRotation(pair.features(), found, turns, pair.dt);
+  const auto shownBeyond = [&](const Eigen::Vector3d& supposed) {
+    const Vector6d velocity = findSynchronised();
+    const Eigen::Vector3d turn = pair.dt * velocity.tail<3>();
+    const Eigen::Vector3d before = pair.dt * state_.prior.velocity().value_or(Vector6d::Zero()).tail<3>();
+    const Eigen::Matrix3d turns = turn * turn.transpose() + before * before.transpose();
+    return state_.rig.shownRotation(pair.features(), found, supposed, turns, pair.dt);
+  };
+  const auto compensateFor = [&](const ShownRotation& shown) { pair.rotation = shown, compensate(pair); };
+  pair.rotation = shownBeyond(Eigen::Vector3d::Zero());
+  if (pair.is == Pair::kFollowed && scene->T_current_reference && !found.isOfMajority()) {
+    // After a knock beyond the matches' noise no motion explains both views, but the left one alone may be explained.
+    const ShownRotation at_first = pair.rotation;
+    const int inliers = found.agreement.inliers;
+    const Eigen::Vector3d yaw = yawByDisparities(pair.given.camera, found.correspondences, *scene->T_current_reference);
+    compensateFor({yaw, Eigen::Matrix3d::Zero(), kCertain, kUnsuspected});
+    pair.rotation = shownBeyond(yaw);
+    if (!found.motion.success || found.agreement.inliers <= inliers || !(pair.rotation.log_odds > 0.0))
+      compensateFor(at_first), findSynchronised();
+  }
   if (!(pair.rotation.log_odds > 0.0)) return;
   compensate(pair);
   findSynchronised();

@@ -17,6 +17,15 @@ Eigen::Matrix3d withRectification(const RightRotation& measured) {
   return measured.covariance + kUsual * kUsual * measured.spread;
 }
 
+/// Log-likelihood ratio that the rotation, for which features are compensated, moved the rows, against a fault of the
+/// disparities alone. `left`: what rows show after the compensation.
+double logRatioOfRows(const std::optional<RightRotation>& left, const Eigen::Vector3d& rotation) {
+  if (!left) return 0.0;
+  const Eigen::Matrix3d information = withRectification(*left).inverse();
+  const Eigen::Vector3d before = left->value + rotation;
+  return 0.5 * (before.dot(information * before) - left->value.dot(information * left->value));
+}
+
 /// log(1 + exp(x)), for any x.
 double logOnePlus(double x) {
   return std::max(x, 0.0) + std::log1p(std::exp(-std::abs(x)));
@@ -36,21 +45,22 @@ LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assu
 
 /// Weighs a rotation against errors of rectification and the noise of this rig's rotations.
 ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
-                                       const Eigen::Matrix3d& turns, double dt) const {
+                                       const Eigen::Vector3d& supposed, const Eigen::Matrix3d& turns, double dt) const {
   constexpr double kKnock = 0.0175;  // rad (chosen): prior of a knock, a degree
   ShownRotation shown;
   if (features.count() < kFewestMeasured) return shown;
   std::optional<RightRotation> by_disparities;
   // A minority's motion may be a mover's.
-  if (found.motion.success && 2 * found.agreement.inliers > found.agreement.matches) {
+  if (found.isOfMajority() || (found.motion.success && !supposed.isZero())) {
     NoiseOptions scaled = assumed_;
     scaled.corner *= noise.scale();
     by_disparities = rotationByDisparities(features.camera, scaled, found.correspondences, found.motion.inliers,
                                            found.motion.T_current_reference);
   }
+  const std::optional<RightRotation> by_rows = row_pattern.change(features);
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d weighted = Eigen::Vector3d::Zero();
-  for (const auto& by : {row_pattern.change(features), by_disparities}) {
+  for (const auto& by : {by_rows, by_disparities}) {
     if (!by) continue;
     const Eigen::Matrix3d known = withRectification(*by).inverse();
     information += known, weighted += known * by->value;
@@ -60,7 +70,7 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   // A right image that is late by d looks rotated by d / dt of the camera's rotation. The map's last pair may be late,
   // too.
   const double late = dt > 0.0 ? delay_sigma_ / dt : 0.0;
-  shown.value = covariance * weighted;
+  shown.value = supposed + covariance * weighted;
   shown.covariance = covariance + late * late * turns + rotation_noise_;
   const auto log_factor = [&](const Eigen::Matrix3d& prior) {
     return logBayesFactor<3>(shown.value, shown.covariance.inverse(), prior);
@@ -68,6 +78,7 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   const double knock = kUnsuspected + log_factor(kKnock * kKnock * Eigen::Matrix3d::Identity());
   const double other_moment = driver_fault_ + log_factor(turns);
   shown.log_odds = knock - logOnePlus(other_moment);
+  if (!supposed.isZero()) shown.log_odds = std::min(shown.log_odds, logRatioOfRows(by_rows, supposed));
   shown.other_moment = other_moment - logOnePlus(knock);
   return shown;
 }

@@ -48,10 +48,11 @@ struct LearntRig {
 
   LearntRig(const CalibrationOptions& options, const NoiseOptions& noise);
 
-  /// New rotation of the right camera. `features`: rotated back by the known one; `found`: their motion, if any;
-  /// `turns`, rad^2: second moment of the camera's rotations over the last two intervals, of `dt` s each.
+  /// New rotation of the right camera. `features`: rotated back by the known one and by the `supposed` new one, rad;
+  /// `found`: their motion, if any; `turns`, rad^2: second moment of the camera's rotations over the last two
+  /// intervals, of `dt` s each.
   ShownRotation shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
-                              const Eigen::Matrix3d& turns, double dt) const;
+                              const Eigen::Vector3d& supposed, const Eigen::Matrix3d& turns, double dt) const;
 
   /// Adds a new rotation. A rotation that undoes the last one counts as noise of this rig.
   void rotate(const ShownRotation& shown, const StereoCamera& camera);

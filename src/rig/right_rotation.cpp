@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "../common/statistics.hpp"
 #include "../motion/pose_problem.hpp"
 #include "row_delay.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
@@ -33,6 +34,18 @@ StereoFeatures rotatedBack(const StereoFeatures& features, const Eigen::Vector3d
     result.dv[i] -= static_cast<float>(moved.y());
   }
   return result;
+}
+
+Eigen::Vector3d yawByDisparities(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
+                                 const Eigen::Isometry3d& T_current_reference) {
+  std::vector<double> yaws;
+  for (const Correspondence& c : correspondences) {
+    const std::optional<Eigen::Vector3d> residual = reprojectionResidual(camera, T_current_reference, c);
+    if (residual)
+      yaws.push_back((residual->z() - residual->x()) /
+                     rotationJacobian(camera, c.measurement.z(), c.measurement.y())(0, 1));
+  }
+  return {0.0, median(yaws), 0.0};
 }
 
 std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, const NoiseOptions& noise,

@@ -28,6 +28,11 @@ Eigen::Matrix<double, 2, 3> rotationJacobian(const StereoCamera& camera, double 
 /// The features as the right camera would have seen them without the rotation.
 StereoFeatures rotatedBack(const StereoFeatures& features, const Eigen::Vector3d& rotation);
 
+/// Rotation about the vertical axis by which disparities differ from those under a motion (median over the matches). It
+/// is where a search begins if no motion explains both views.
+Eigen::Vector3d yawByDisparities(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
+                                 const Eigen::Isometry3d& T_current_reference);
+
 /// Rotation of the right camera since the reference, from the disparities of a motion's inliers. Motion and rotation
 /// are estimated together. Rows are not used: rectification distorts them (RowPattern). None with too few inliers.
 std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, const NoiseOptions& noise,

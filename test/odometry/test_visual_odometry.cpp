@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "../../src/rig/right_rotation.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
@@ -401,6 +402,22 @@ TEST(VisualOdometry, ARightCameraThatTurnsUnderWayIsWatched) {
     EXPECT_EQ(result.state, much ? TrackingState::kDegraded : TrackingState::kTracking) << result.reason;
     EXPECT_EQ(contains(result.reason, "the right camera"), much) << result.reason;
     expectState(follow(odometry, 15, 7), TrackingState::kTracking);
+  }
+}
+
+TEST(VisualOdometry, AYawOfTheRightCameraThatNoMotionExplainsIsCompensated) {
+  for (const double degrees : {-1.0, -0.5, 0.5, 1.0}) {
+    SCOPED_TRACE(degrees);
+    const Eigen::Vector3d yaw(0.0, degrees * CV_PI / 180.0, 0.0);
+    VisualOdometry odometry({});
+    expectState(follow(odometry, 5), TrackingState::kTracking);
+    OdometryResult result = odometry.update(rotatedBack(pairOf(6), -yaw));
+    expectState(result, TrackingState::kDegraded, "the right camera seems to have turned");
+    for (int i = 7; i <= 15; ++i) result = odometry.update(rotatedBack(pairOf(i), -yaw));
+    expectState(result, TrackingState::kTracking);
+    EXPECT_EQ(result.epoch, 0);
+    EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(15)),
+              0.03 * trueSinceStart(15).translation().norm());
   }
 }
 

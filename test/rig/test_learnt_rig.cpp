@@ -8,7 +8,7 @@ namespace sdvo::test_learnt_rig {
 
 ShownRotation shown(const LearntRig& rig, const StereoFeatures& features,
                     const Eigen::Vector3d& turn = Eigen::Vector3d::Zero()) {
-  return rig.shownRotation(features, MotionHypothesis(), turn * turn.transpose(), 0.1);
+  return rig.shownRotation(features, MotionHypothesis(), Eigen::Vector3d::Zero(), turn * turn.transpose(), 0.1);
 }
 
 void learn(LearntRig& rig, const StereoFeatures& features, int pairs = 1) {
