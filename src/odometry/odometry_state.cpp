@@ -75,12 +75,21 @@ void OdometryState::recover(const VisualOdometryOptions& options) {
 }
 
 void OdometryState::startAgain() {
+  if (map) left = LeftMap{std::move(*map), T_origin_camera, covariance, last_pose_stamp, epoch};
+  map.reset();
   ++epoch;
   const std::int64_t last = last_pose_stamp.value_or(seed->newestStamp());
   const Matrix6d unseen = prior.unseen(static_cast<double>(seed->newestStamp() - last) * 1e-9);
   covariance.beginMap();
   covariance.spread(prior.unknown() + unseen);
   last_pose_stamp = seed->newestStamp();
+}
+
+void OdometryState::comeBack() {
+  T_origin_camera = left->T_origin_camera;
+  covariance = left->covariance;
+  last_pose_stamp = left->last_pose_stamp;
+  epoch = left->epoch;
 }
 
 void OdometryState::takeSeed() {
@@ -116,7 +125,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
     if (known_floor && floor.isOnFloor())
       result.pose_covariance = known_floor->constrained(T_origin_camera, result.pose_covariance);
   }
-  if (step.T_previous_current && !step.starts_again) {
+  if (step.T_previous_current && !step.changes_epoch) {
     result.has_motion = true;
     result.T_previous_current = *step.T_previous_current;
     result.motion_covariance = step.covariance;

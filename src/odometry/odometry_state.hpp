@@ -33,9 +33,19 @@ struct OdometryStep {
   std::vector<int> rejected_features;      ///< matched features of the pair that the adjustment does not confirm
   double dt = 0.0;                         ///< see OdometryResult, s
   double time = 0.0;                       ///< of computation, s
-  bool starts_again = false;               ///< a new epoch: the motion is since a pair without a pose
+  bool changes_epoch = false;              ///< the motion is not since the last reported pose
 
   bool hasPose() const { return state == TrackingState::kTracking || state == TrackingState::kDegraded; }
+};
+
+/// A map that another one replaced after an outage, and the last pose in it. Foreign images may have made the other
+/// one: the place of this one is looked for whenever the camera is lost.
+struct LeftMap {
+  LocalMap map;
+  Eigen::Isometry3d T_origin_camera;
+  PoseCovariance covariance;
+  std::optional<std::int64_t> last_pose_stamp;  ///< ns
+  int epoch;
 };
 
 /// Alignment of patches under the odometry's noise.
@@ -53,6 +63,7 @@ struct OdometryState {
   /// once the next pair is measured against it.
   std::optional<LocalMap> seed;
   bool seed_has_pose = false;  ///< the seed's pose is that of the guesses
+  std::optional<LeftMap> left;
   LearntRig rig;
   MotionPrior prior;
   Doubt doubt;
@@ -84,8 +95,12 @@ struct OdometryState {
   /// gave is kept. The next pair starts a map there under a new epoch.
   void recover(const VisualOdometryOptions& options);
 
-  /// A new epoch begins at the seed. The unknown motion before it widens the covariance.
+  /// A new epoch begins at the seed. The unknown motion before it widens the covariance. The map, if any, is left.
   void startAgain();
+  /// The camera is found in the map that was left: epoch and pose are those of that map again.
+  void comeBack();
+  /// Earlier maps are of no use for the next pairs.
+  void forgetMaps() { map.reset(), left.reset(); }
   /// The seed becomes the map.
   void takeSeed();
 

@@ -204,7 +204,7 @@ void VisualOdometry::Impl::mountAt(const Eigen::Isometry3d& T_base_camera) {
   T_base_camera_ = T_base_camera;
   if (is_same || !state_.started) return;
   breakStream();
-  state_.map.reset();  // it is in the old camera's axes
+  state_.forgetMaps();  // they are in the old camera's axes
   state_.forgetRig(options_);
   state_.T_origin_camera = orthonormalised(T_before_now.inverse() * state_.T_origin_camera * T_before_now);
   state_.covariance.advance(T_before_now, Matrix6d::Zero());
@@ -215,6 +215,7 @@ void VisualOdometry::Impl::takePose(const Matrix6d& covariance) {
   given.has_pose = true, given.pose_covariance = covariance;
   if (const std::string defect = given.defect(); !defect.empty()) throw std::invalid_argument(defect);
   state_.covariance.assume(covariance);
+  state_.left.reset();  // its poses are from before
   ++state_.epoch;
   if (!state_.interrupted) return;
   state_.map.reset();
@@ -466,20 +467,22 @@ double VisualOdometry::Impl::largestDoubt() const {
   return logOdds(1.0 - options_.tracking.probability);
 }
 
-/// Searches the pair in the map from before an outage, then in the seed. The camera's motion meanwhile is unknown.
+/// Searches the pair in the map from before an outage, in the one before that, then in the seed. The camera's motion
+/// meanwhile is unknown.
 std::optional<MotionScene> VisualOdometry::Impl::reacquire(const StereoFeatures& features) const {
   std::optional<MotionScene> scene;
-  const LocalMap& map = *state_.map;
-  const auto place = reacquisition_.find(map, features, state_.rig.calibration.calibration());
-  const double since = map.secondsUntil(features);
-  if (place && state_.prior.tooFast(place->T_current_newest.inverse(), Matrix6d::Zero(), since).empty()) {
-    scene.emplace(sceneOf(map, features, 0.0, std::nullopt));
+  for (const LocalMap* map : {&*state_.map, state_.left ? &state_.left->map : nullptr}) {
+    if (!map || !map->continuedBy(features)) continue;
+    const auto place = reacquisition_.find(*map, features, state_.rig.calibration.calibration());
+    const double since = map->secondsUntil(features);
+    if (!place || !state_.prior.tooFast(place->T_current_newest.inverse(), Matrix6d::Zero(), since).empty()) continue;
+    scene.emplace(sceneOf(*map, features, 0.0, std::nullopt));
     scene->place = weigh(*place, scene->prior);
     scene->T_current_reference = scene->place->T_current_newest;
     scene->prior.clear();
-  } else if (state_.seed) {
-    scene.emplace(sceneOf(*state_.seed, features, 0.0, std::nullopt));
+    return scene;
   }
+  if (state_.seed) scene.emplace(sceneOf(*state_.seed, features, 0.0, std::nullopt));
   return scene;
 }
 
@@ -534,7 +537,9 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::extendMap(const StereoFeatures&
   if (!refutation.empty()) return passOver(refutation + " after the adjustment");
 
   const bool is_seed = state_.seed && &scene.map == &*state_.seed, starts_again = is_seed && !state_.seed_has_pose;
+  const bool comes_back = state_.left && &scene.map == &state_.left->map;
   if (starts_again) state_.startAgain();
+  if (comes_back) state_.comeBack();
   if (is_seed) state_.covariance.beginMap();
   const Belief belief = state_.doubt.weigh(scene, found, evidence);
   commit(candidate, belief);
@@ -544,7 +549,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::extendMap(const StereoFeatures&
   const std::string doubt = doubtWords(scene, found, candidate, belief);
   step.state = doubt.empty() && !starts_again ? TrackingState::kTracking : TrackingState::kDegraded;
   step.probability = belief.probability;
-  step.starts_again = starts_again;
+  step.changes_epoch = starts_again || comes_back;
   if (!doubt.empty()) step.reason = "doubtful: " + doubt;
   // A motion that is probably not the camera's predicts nothing.
   if (belief.probability >= 0.5)
@@ -556,6 +561,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::extendMap(const StereoFeatures&
   }
   state_.outage.end();
   state_.seed.reset();
+  if (comes_back) state_.left.reset();
   if (std::exchange(state_.interrupted, false))
     step.reason = (starts_again ? kStartedAgain
                    : is_seed    ? "goes on where the guess had the camera"

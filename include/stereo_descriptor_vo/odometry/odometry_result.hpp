@@ -31,7 +31,7 @@ struct OdometryResult {
   std::int64_t stamp = 0;  ///< of the left image, ns
   /// Probability that the measured motion is the camera's; NaN without a measurement.
   double probability = std::numeric_limits<double>::quiet_NaN();
-  int epoch = 0;  ///< one more after every discontinuity of the pose
+  int epoch = 0;  ///< one more after a discontinuity of the pose; an earlier one in the map from before, found again
 
   bool has_pose = false;  ///< false while waiting or lost: nothing may be published then
   Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();  ///< origin: the first left camera
