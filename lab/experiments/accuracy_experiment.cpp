@@ -139,7 +139,7 @@ using Results = std::map<Case, std::vector<Run>>;  // one run for each seed
 class DriveAccuracy {
  public:
   DriveAccuracy(const ReferenceSequence& sequence, const RigCalibration& rig, const AccuracyExperiment& experiment,
-                const PipelineOptions& options)
+                const ExperimentOptions& options)
       : sequence_(sequence), rig_(rig), experiment_(experiment), options_(options) {}
 
   Results run() {
@@ -190,7 +190,7 @@ class DriveAccuracy {
   const ReferenceSequence& sequence_;
   const RigCalibration rig_;
   const AccuracyExperiment& experiment_;
-  const PipelineOptions& options_;
+  const ExperimentOptions& options_;
   Results results_;
 };
 
@@ -199,7 +199,7 @@ class DriveAccuracy {
 void runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& experiment) {
   if (std::count(experiment.systems.begin(), experiment.systems.end(), "standard") == 0)
     throw std::invalid_argument("the system 'standard' is missing: the others are compared with it");
-  PipelineOptions options = setup.options();
+  ExperimentOptions options = setup.options();
   const std::string hash = hashOptions(listOptions(options));
   const std::string descriptor = nameOf(options.stereo_features.descriptor.type);
   CsvTable runs({"sequence", "descriptor", "features", "step", "model", "method", "system", "seed", "pair_percent",

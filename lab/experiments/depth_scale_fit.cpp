@@ -145,7 +145,7 @@ double ShapeFit::value(double disparity) const {
   return std::pow(disparity, exponent) + offset;
 }
 
-std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const PipelineOptions& options,
+std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const ExperimentOptions& options,
                                     const SizeSampling& sampling) {
   const FeatureExtractorOptions& extraction = options.stereo_features;
   const auto base = makeBaseDescriptor(extraction.descriptor.type);
@@ -158,11 +158,11 @@ std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const Pip
   std::vector<SizeSample> samples;
   Progress progress("sampling " + sequence.name, sequence.frames / sampling.stride + 1);
   for (int t = 0; t + 1 < sequence.frames; t += sampling.stride, progress.step()) {
-    const KeypointSet first = findKeypoints(sequence.images, t, extraction.detector, extraction.stereo);
+    const KeypointSet first = findKeypoints(sequence.images, t, options);
     const std::vector<int> chosen =
         selectKeypoints(first, {DepthScale(first_size)}, reach, extraction.detector.bucket_size, sampling.features);
     for (int step = 2; step <= sampling.max_step && t + step < sequence.frames; step += 2) {
-      const KeypointSet later = findKeypoints(sequence.images, t + step, extraction.detector, extraction.stereo);
+      const KeypointSet later = findKeypoints(sequence.images, t + step, options);
       std::vector<ViewKeypoint> first_views;
       const std::vector<Follower> followers = follow(first, chosen, later, sequence.motion(t, t + step));
       for (const Follower& f : followers) first_views.push_back(leftView(first.corners[f.first], sampling.first_size));
@@ -202,7 +202,7 @@ std::vector<ShapeFit> fitShapes(const std::vector<SizeSample>& samples) {
           fitShape(samples, "a*d^b", true, false), fitShape(samples, "a*d^b+c", true, true)};
 }
 
-std::vector<CurveTrial> tryCurves(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
+std::vector<CurveTrial> tryCurves(const std::vector<ReferenceSequence>& sequences, const ExperimentOptions& options,
                                   const std::vector<DepthScaleOptions>& curves, int features) {
   constexpr int kStride = 10, kSteps[] = {1, 4, 7, 10};
   constexpr double kTolerance = 3.0;  // px
@@ -223,7 +223,7 @@ std::vector<CurveTrial> tryCurves(const std::vector<ReferenceSequence>& sequence
     Progress progress("trying curves " + sequence.name, sequence.frames / kStride + 1);
     for (int t = 0; t + 1 < sequence.frames; t += kStride, progress.step()) {
       const auto describe = [&](int i) {
-        const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
+        const KeypointSet set = findKeypoints(sequence.images, i, options);
         const auto chosen = selectKeypoints(set, all, reach, extraction.detector.bucket_size, features);
         return describeKeypoints(set, chosen, all, descriptor);
       };

@@ -24,7 +24,7 @@ struct SizeSampling {
 
 /// Features followed by the reference motion alone, so that no descriptor decides which ones are kept: the later view
 /// is the corner next to the reprojection. Its size is searched over 0.5…4 times the first one.
-std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const PipelineOptions& options,
+std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const ExperimentOptions& options,
                                     const SizeSampling& sampling);
 
 /// A curve size ~ disparity^exponent + offset, up to the common factor that ratios do not tell.
@@ -51,7 +51,7 @@ struct CurveTrial {
 
 /// Correct matches (as in experiment A) over pairs 1, 4, 7 and 10 steps apart, which stand for its ten steps, for every
 /// curve on the same key points. Needs at least two pairs in each sequence.
-std::vector<CurveTrial> tryCurves(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
+std::vector<CurveTrial> tryCurves(const std::vector<ReferenceSequence>& sequences, const ExperimentOptions& options,
                                   const std::vector<DepthScaleOptions>& curves, int features);
 
 }  // namespace sdvo

@@ -24,6 +24,24 @@ const std::vector<SetupDifference>& otherDifferences() {
   return differences;
 }
 
+namespace {
+
+/// Options by name that are the paper's whatever the nodelets' defaults are.
+const std::vector<std::string> kFixed = {"detector/type=fast", "detector/min_spacing=0",
+                                         "stereo/max_epipolar_residual=1.5", "descriptor/extend_border=true"};
+
+/// The same for fields without a name. Corners are of at least 3 grey levels in every image: a loose threshold, by
+/// which the paper's largest sets have 2320 features.
+void fix(ExperimentOptions& options) {
+  options.noise = 0.5;
+  options.tracks = true;
+  FeatureExtractorOptions& features = options.stereo_features;
+  features.detector.bucket_size = 50;
+  features.stereo.min_disparity = 0.5;
+}
+
+}  // namespace
+
 std::vector<Ablation> ablations() {
   std::vector<Ablation> all;
   for (const Setup setup : {Setup::kProduct, Setup::kPaper}) all.push_back({setup, "as it is", {}});
@@ -37,16 +55,19 @@ std::vector<Ablation> ablations() {
   return all;
 }
 
-PipelineOptions ExperimentSetup::options() const {
+ExperimentOptions ExperimentSetup::options() const {
   const auto read = [this](bool freak) {
     // A loose threshold, as in the paper: weak corners belong to the large feature sets.
     std::vector<std::string> all = {"stereo_features/detector/max_features=5000", "detector/min_contrast=6"};
-    if (setup == Setup::kPaper)
+    if (setup == Setup::kPaper) {
+      all.insert(all.end(), kFixed.begin(), kFixed.end());
       for (const SetupDifference& difference : paperDifferences())
         if (freak || !difference.of_freak) all.insert(all.end(), difference.with.begin(), difference.with.end());
+    }
     all.insert(all.end(), settings.begin(), settings.end());
-    PipelineOptions options = readPipelineOptions("", all);
+    ExperimentOptions options{readPipelineOptions("", all)};
     options.stereo_features.detector.corner_quality = 0.0002;
+    if (setup == Setup::kPaper) fix(options);
     return options;
   };
   const bool freak = read(true).stereo_features.descriptor.type == DescriptorType::kFreak;

@@ -45,6 +45,12 @@ struct Ablation {
 
 std::vector<Ablation> ablations();
 
+/// The pipeline's options, and what only experiments can set.
+struct ExperimentOptions : PipelineOptions {
+  double noise = 0.0;   ///< grey levels that FAST's min_contrast multiplies in every image; 0: each image's own noise
+  bool tracks = false;  ///< finds corners in the right image by tracking (paper, section 4), not by a search of rows
+};
+
 /// What all experiments on sequences share.
 struct ExperimentSetup {
   std::string kitti;                   ///< directory that holds sequences/NN
@@ -55,9 +61,10 @@ struct ExperimentSetup {
   int frames = 0;                     ///< pairs used of each sequence; 0: all
   std::vector<std::string> settings;  ///< name=value of the package's options
 
-  /// The nodelets' options, but for a detector that finds enough corners for the largest feature set; the differences
-  /// of the set-up; and, above all, `settings`.
-  PipelineOptions options() const;
+  /// Options by which the detector finds enough corners for the largest feature set; the differences of the set-up;
+  /// and, above all, `settings`. All others are the nodelets'. The paper's set-up has detector and tolerances of its
+  /// own.
+  ExperimentOptions options() const;
 
   /// The same with another base descriptor.
   ExperimentSetup withDescriptor(DescriptorType type) const;

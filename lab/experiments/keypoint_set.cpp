@@ -5,19 +5,40 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../../src/front_end/fast_corners.hpp"
 #include "../../src/front_end/integral_image.hpp"
+#include "stereo_tracking.hpp"
 
 namespace sdvo {
-KeypointSet findKeypoints(const KittiSequence& sequence, int i, const FeatureDetectorOptions& detector,
-                          const StereoMatcherOptions& stereo) {
+namespace {
+
+std::vector<Corner> findCorners(const cv::Mat& image, const ExperimentOptions& options) {
+  const FeatureDetectorOptions& detector = options.stereo_features.detector;
+  if (options.noise <= 0.0 || detector.type != DetectorType::kFast) return FeatureDetector(detector).detect(image);
+  std::vector<Corner> corners;
+  for (const cv::KeyPoint& keypoint : findFastCorners(image, cvRound(options.noise * detector.min_contrast)))
+    corners.push_back({keypoint.pt, keypoint.response});
+  corners = keepApart(std::move(corners), detector.min_spacing);
+  corners = spreadOverBuckets(corners, image.size(), detector.bucket_size, detector.max_features);
+  if (detector.subpixel)
+    for (Corner& corner : corners) corner.position += cornerPeak(image, cv::Point(corner.position));
+  return corners;
+}
+
+}  // namespace
+
+KeypointSet findKeypoints(const KittiSequence& sequence, int i, const ExperimentOptions& options) {
   KeypointSet set;
   set.stamp = sequence.stamp(i);
   set.camera = sequence.camera();
   set.images = sequence.load(i);
-  const std::vector<Corner> corners = FeatureDetector(detector).detect(set.images.left);
+  const std::vector<Corner> corners = findCorners(set.images.left, options);
   std::vector<cv::Point2f> positions;
   for (const Corner& corner : corners) positions.push_back(corner.position);
-  for (const StereoMatch& match : StereoMatcher(stereo).match(set.images.left, set.images.right, positions))
+  const StereoMatcherOptions& stereo = options.stereo_features.stereo;
+  const auto& [left, right] = set.images;
+  for (const StereoMatch& match : options.tracks ? trackToRight(left, right, positions, stereo)
+                                                 : StereoMatcher(stereo).match(left, right, positions))
     set.corners.push_back({corners[static_cast<std::size_t>(match.left_index)], match});
   return set;
 }

@@ -10,6 +10,7 @@
 #include "../../src/front_end/patch_cutter.hpp"
 #include "../../src/front_end/stereo_descriptor.hpp"
 #include "../../src/front_end/stereo_matcher.hpp"
+#include "experiment_setup.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 
@@ -30,8 +31,7 @@ struct KeypointSet {
 };
 
 /// Detects and stereo matches frame i of a sequence.
-KeypointSet findKeypoints(const KittiSequence& sequence, int i, const FeatureDetectorOptions& detector,
-                          const StereoMatcherOptions& stereo);
+KeypointSet findKeypoints(const KittiSequence& sequence, int i, const ExperimentOptions& options);
 
 /// Distance in px from its centre within which a key point of a size in px needs the image.
 using Reach = std::function<double(double size)>;

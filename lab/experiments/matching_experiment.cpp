@@ -69,7 +69,7 @@ struct DescribedFrame {
 class SequenceMatching {
  public:
   SequenceMatching(const ReferenceSequence& sequence, const MatchingExperiment& experiment,
-                   const ExperimentSetup& setup, const PipelineOptions& options)
+                   const ExperimentSetup& setup, const ExperimentOptions& options)
       : sequence_(sequence), experiment_(experiment), options_(options) {
     for (const DescriptorType type : experiment.descriptors) {
       std::vector<DepthScale>& curves = curves_.emplace_back();
@@ -96,9 +96,7 @@ class SequenceMatching {
           if (frames[d].count(i)) continue;
           auto found = keypoints.find(i);
           if (found == keypoints.end()) {
-            const auto& extraction = options_.stereo_features;
-            found =
-                keypoints.emplace(i, findKeypoints(sequence_.images, i, extraction.detector, extraction.stereo)).first;
+            found = keypoints.emplace(i, findKeypoints(sequence_.images, i, options_)).first;
           }
           frames[d][i] = describe(d, found->second);
         }
@@ -152,7 +150,7 @@ class SequenceMatching {
 
   const ReferenceSequence& sequence_;
   const MatchingExperiment& experiment_;
-  const PipelineOptions& options_;
+  const ExperimentOptions& options_;
   std::vector<std::vector<DepthScale>> curves_;  ///< [descriptor][side]
   std::vector<StereoDescriptor> descriptors_;
   Scores scores_;
@@ -161,7 +159,7 @@ class SequenceMatching {
 }  // namespace
 
 void runMatching(const ExperimentSetup& setup, const MatchingExperiment& experiment) {
-  PipelineOptions options = setup.options();
+  ExperimentOptions options = setup.options();
   const std::string hash = hashOptions(listOptions(options));
   const std::vector<Side> sides = makeSides(setup, DescriptorType::kFreak, experiment);  // their names
   CsvTable table({"sequence", "descriptor", "layout", "features", "tolerance_px", "side", "step", "correct", "pairs",

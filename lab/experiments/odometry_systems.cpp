@@ -13,7 +13,7 @@ const std::vector<OdometrySystem>& odometrySystems() {
   return systems;
 }
 
-DescribedSequence describeSequence(const ReferenceSequence& sequence, const PipelineOptions& options,
+DescribedSequence describeSequence(const ReferenceSequence& sequence, const ExperimentOptions& options,
                                    double standard_size, int count) {
   const FeatureExtractorOptions& extraction = options.stereo_features;
   DepthScaleOptions normalised = extraction.sizeCurve(), constant = extraction.sizeCurve();
@@ -33,7 +33,7 @@ DescribedSequence describeSequence(const ReferenceSequence& sequence, const Pipe
   described.of_system.resize(odometrySystems().size());
   Progress progress("describing " + sequence.name, sequence.frames);
   for (int i = 0; i < sequence.frames; ++i, progress.step()) {
-    const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
+    const KeypointSet set = findKeypoints(sequence.images, i, options);
     const std::vector<int> chosen = selectKeypoints(set, curves, reach, extraction.detector.bucket_size, count);
     std::vector<int> all_rows;
     for (std::size_t k = 0; k < chosen.size(); ++k) all_rows.push_back(static_cast<int>(k));

@@ -31,7 +31,7 @@ struct DescribedSequence {
 };
 
 /// A sequence described by every system on the same `count` features of each pair.
-DescribedSequence describeSequence(const ReferenceSequence& sequence, const PipelineOptions& options,
+DescribedSequence describeSequence(const ReferenceSequence& sequence, const ExperimentOptions& options,
                                    double standard_size, int count);
 
 /// 3-D to stereo correspondences of the matches between two pairs.

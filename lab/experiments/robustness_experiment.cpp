@@ -17,7 +17,7 @@ struct Sum {
 using Sums = std::vector<std::vector<Sum>>;  // [system][step - 1]
 
 Sums measure(const ReferenceSequence& sequence, const RobustnessExperiment& experiment,
-             const PipelineOptions& options) {
+             const ExperimentOptions& options) {
   const auto described = describeSequence(sequence, options, experiment.standard_size, experiment.features).of_system;
   Sums sums(described.size(), std::vector<Sum>(kSteps));
   Progress progress("robustness " + sequence.name, sequence.frames / experiment.stride + 1);
@@ -46,7 +46,7 @@ Sums measure(const ReferenceSequence& sequence, const RobustnessExperiment& expe
 }  // namespace
 
 void runRobustness(const ExperimentSetup& setup, const RobustnessExperiment& experiment) {
-  PipelineOptions options = setup.options();
+  ExperimentOptions options = setup.options();
   const std::string hash = hashOptions(listOptions(options));
   const std::string descriptor = nameOf(options.stereo_features.descriptor.type);
   CsvTable table({"sequence", "descriptor", "features", "step", "system", "matches", "inliers", "successes", "runs",

@@ -76,9 +76,10 @@ void describeByImage(const KeypointSet& set, const cv::Ptr<cv::Feature2D>& featu
 
 Methods describeAll(const ReferenceSequence& sequence, int i, const ExperimentSetup& setup,
                     const ScaleExperiment& experiment) {
-  const FeatureExtractorOptions extraction = setup.options().stereo_features;
+  const ExperimentOptions options = setup.options();
+  const FeatureExtractorOptions& extraction = options.stereo_features;
   const double begin = cpuMs();
-  const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
+  const KeypointSet set = findKeypoints(sequence.images, i, options);
   const double detection = cpuMs() - begin;
   Methods methods;
   // Stereo matching thins the key points of OpenCV's detectors: a quarter more leaves about as many (chosen).
@@ -139,7 +140,7 @@ int scaleIndex(double ratio) {
 }
 
 void runScaleChange(const ExperimentSetup& setup, const ScaleExperiment& experiment) {
-  PipelineOptions options = setup.options();
+  ExperimentOptions options = setup.options();
   const std::string hash = hashOptions(listOptions(options));
   CsvTable table({"sequence", "method", "scale", "visible", "correct", "percent", "pairs", "features", "ms_per_pair",
                   "reference", "options"});

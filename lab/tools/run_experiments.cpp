@@ -168,7 +168,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     const std::string& output = arguments.setup.output;
-    const sdvo::PipelineOptions options = arguments.setup.options();  // refuses bad settings before the work begins
+    const sdvo::ExperimentOptions options = arguments.setup.options();  // refuses bad settings before the work begins
     std::error_code failure;
     std::filesystem::create_directories(output, failure);
     if (failure) throw std::runtime_error("cannot make the directory " + output + ": " + failure.message());

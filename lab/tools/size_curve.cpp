@@ -90,7 +90,7 @@ void writeYaml(const std::string& path, const sdvo::ShapeFit& shape, const sdvo:
 
 int run(const Arguments& arguments) {
   cv::setNumThreads(1);
-  const sdvo::PipelineOptions options = arguments.setup.options();
+  const sdvo::ExperimentOptions options = arguments.setup.options();
   std::vector<sdvo::ReferenceSequence> sequences;
   for (const std::string& name : arguments.setup.sequences)
     sequences.push_back(sdvo::openSequence(arguments.setup, name, arguments.setup.reference));

@@ -33,7 +33,7 @@ int overhang(const BaseDescriptor& base, cv::Size size, const std::vector<Stereo
 }  // namespace
 
 void DescriptorOptions::describe(OptionList& list) {
-  list.add("type", type, "base descriptor");
+  list.add("type", type, "base descriptor; freak is this package's own (box filters, own bit pairs), not OpenCV's");
   list.add("layout", layout, "one view, or the left half followed by the right half");
   list.add("oriented", oriented, "turn the pattern to the left view's orientation (both halves by the same angle)");
   list.add(

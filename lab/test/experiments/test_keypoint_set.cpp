@@ -99,12 +99,13 @@ TEST_P(FeatureSetSize, IsTheWantedOneWithinFivePercent) {
   const char* kitti = std::getenv("KITTI_DIR");
   if (!kitti) GTEST_SKIP() << "KITTI_DIR is not set: feature sets of a real image are not counted";
   const KittiSequence sequence(std::string(kitti) + "/sequences/06");
-  FeatureDetectorOptions detector;
+  ExperimentOptions options;
+  FeatureDetectorOptions& detector = options.stereo_features.detector;
   detector.type = valueOf<DetectorType>(GetParam());
   detector.max_features = 12000;
   detector.min_contrast = 6.0;
   detector.corner_quality = 0.0002;
-  const KeypointSet set = findKeypoints(sequence, 10, detector, {});
+  const KeypointSet set = findKeypoints(sequence, 10, options);
   for (const int wanted : {310, 1350, 2320}) {
     const auto chosen = selectKeypoints(set, {constantSize(7.0), constantSize(20.0)}, Freak::reach, 50, wanted);
     EXPECT_NEAR(static_cast<double>(chosen.size()), wanted, 0.05 * wanted);
