@@ -5,6 +5,19 @@
 #include <sstream>
 
 namespace sdvo {
+namespace {
+
+/// Number of matched features, and the mean of their positions.
+std::string placeWords(const StereoFeatures& features, const std::vector<int>& matched) {
+  double u = 0.0, v = 0.0;
+  for (const int i : matched) u += features.u[i], v += features.v[i];
+  const double count = std::max(static_cast<double>(matched.size()), 1.0);
+  std::ostringstream words;
+  words << matched.size() << " matches around (" << std::lround(u / count) << ", " << std::lround(v / count) << ") px";
+  return words.str();
+}
+
+}  // namespace
 
 bool Doubt::lasts() const {
   return log_odds_ > kUnsuspected + std::log(2.0);
@@ -53,8 +66,9 @@ Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, con
 
   std::ostringstream words;
   if (found.rival && rivals >= std::max({misled, shown, carried})) {
-    words << "two motions in view, of " << found.agreement.inliers << " and " << found.rival->matches
-          << " matches, the second with a probability of " << found.rival->probability
+    words << "two motions in view, of " << placeWords(scene.features, found.inlierFeatures()) << " and of "
+          << placeWords(scene.features, found.rival->features) << ", the second with a probability of "
+          << found.rival->probability
           << (found.rival->is_torn ? ", above and below a row: are the images torn or damaged?"
                                    : ": does something move in front of the camera?");
   } else if (misled >= std::max(shown, carried)) {

@@ -236,7 +236,7 @@ void compare(const MotionScene& scene, const std::vector<MotionHypothesis>& hypo
       continue;
     }
     if (!chosen.rival || chosen.rival->probability < probability)
-      chosen.rival = {T, probability, static_cast<int>(rival.features.size()), rival.is_torn};
+      chosen.rival = {T, probability, rival.features, rival.is_torn};
   }
   // Matches that rivals explain are no evidence against the chosen motion.
   explained = sorted(std::move(explained));
@@ -293,14 +293,14 @@ void MotionHypothesis::replaceMotion(const MotionScene& scene, const Eigen::Isom
                                      const std::vector<int>& left) {
   const Eigen::Isometry3d T_found = std::exchange(motion.T_current_reference, T_current_reference);
   const Eigen::Isometry3d apart = T_current_reference * T_found.inverse();
-  const int points = static_cast<int>(motion.inliers.size()), of_other = static_cast<int>(left.size());
+  const int points = static_cast<int>(motion.inliers.size());
   double own = 0.0, others = 0.0;
   for (const int i : motion.inliers) (contains(left, matches[i].current) ? others : own) += sightingsOf(i);
   const double misled = probabilityOf(logLikelihood(own, points) - logLikelihood(others, points));
   rivals_moment += misled * momentOf(logSE3(apart));
   if (isTolerable(scene, T_current_reference, apart)) return;
   probability *= 1.0 - misled;
-  rival = {T_found, misled, of_other, false};
+  rival = {T_found, misled, left, false};
 }
 
 std::vector<int> MotionHypothesis::inlierFeatures(const std::vector<int>& rejected) const {

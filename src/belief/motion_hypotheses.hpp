@@ -76,8 +76,8 @@ struct MotionHypothesis {
   struct Rival {
     Eigen::Isometry3d T_current_reference;
     double probability;
-    int matches;   ///< explained by it alone
-    bool is_torn;  ///< a row of the image separates them from the motion's inliers
+    std::vector<int> features;  ///< of the pair, explained by it alone
+    bool is_torn;               ///< a row of the image separates them from the motion's inliers
   };
   std::optional<Rival> rival;
   Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad

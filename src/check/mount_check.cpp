@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <tuple>
 
 #include "../common/text.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
@@ -26,7 +28,7 @@ void MountCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isomet
   T_base_camera_ = T_base_camera;
   const Eigen::Isometry3d of_base = T_base_camera * T_before_now * T_base_camera.inverse();
   const Eigen::Vector3d t = of_base.translation(), turn = logSO3(of_base.linear());
-  constexpr double kLeast = 1e-3, kLeastTurn = 1e-3;  // m, rad: less is noise
+  constexpr double kLeast = 1e-3, kLeastTurn = 1e-3;              // m, rad: less is noise
   if (t.norm() > kLeast) translations_.add(t.head<2>(), -t.z());  // along the floor
   distance_ += t.norm();
   if (turn.norm() < kLeastTurn) return;
@@ -51,24 +53,34 @@ Finding MountCheck::judge(double tilt_sigma) const {
     covariance = information.inverse();
     tilt = covariance * (translations_.product / of_translations + rotations_.product / of_rotations);
   }
-  const Eigen::Vector3d normal = Eigen::Vector3d(tilt.x(), tilt.y(), 1.0).normalized();
-  const Eigen::Quaterniond upright = Eigen::Quaterniond::FromTwoVectors(normal, Eigen::Vector3d::UnitZ());
-  const double pitch = -std::atan(tilt.x()) / kDegree, roll = std::atan(tilt.y()) / kDegree;
-  const std::string what = text(1, "by the floor the camera is pitched down by ", pitch, " +- ",
-                                std::sqrt(covariance(0, 0)) / kDegree, " deg more and rolled by ", roll, " +- ",
-                                std::sqrt(covariance(1, 1)) / kDegree, " deg more than on TF");
+  const auto deviation = [&](int axis) { return std::sqrt(covariance(axis, axis)); };
   const auto isWrong = [&](int axis) {
     const double angle = std::abs(std::atan(tilt[axis]));
-    return angle > kRelevant * sigma && angle > kProved * std::sqrt(covariance(axis, axis)) && angle < kMost * kDegree;
+    return angle > kRelevant * sigma && angle > kProved * deviation(axis) && angle < kMost * kDegree;
   };
-  if (!isWrong(0) && !isWrong(1)) return {Verdict::kOk, what};
+  const bool is_wrong = isWrong(0) || isWrong(1);
+  std::string what;
+  for (const auto& [axis, how, sign] : {std::tuple(0, "pitched down by ", -1.0), std::tuple(1, "rolled by ", 1.0)}) {
+    // Without turns, a straight way shows the tilt along it alone.
+    const bool is_known = isWrong(axis) || deviation(axis) < kRelevant * sigma;
+    if (!is_known) tilt[axis] = 0.0;
+    if (is_known)
+      what += text(1, what.empty() ? "by the floor the camera is " : " and ", how,
+                   sign * std::atan(tilt[axis]) / kDegree, " +- ", deviation(axis) / kDegree, " deg more");
+  }
+  if (what.empty()) return {Verdict::kOpen, "the floor shows no tilt yet", "drive two metres, with a turn"};
+  what += " than on TF";
+  if (!is_wrong) return {Verdict::kOk, what};
+  const Eigen::Vector3d normal = Eigen::Vector3d(tilt.x(), tilt.y(), 1.0).normalized();
+  const Eigen::Quaterniond upright = Eigen::Quaterniond::FromTwoVectors(normal, Eigen::Vector3d::UnitZ());
   Eigen::Matrix3d R_link_optical;  // a link looks along x
   R_link_optical << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
   const Eigen::Matrix3d R = upright * T_base_camera_.linear() * R_link_optical.transpose();
-  return {Verdict::kWarn, what,
-          text(4, "the camera's mount on TF is wrong, or the floor is none: rpy of a camera link that looks along x is ",
-               std::atan2(R(2, 1), R(2, 2)), " ", -std::asin(std::clamp(R(2, 0), -1.0, 1.0)), " ",
-               std::atan2(R(1, 0), R(0, 0)), " rad with a right mount (mount_rpy, URDF)")};
+  return {
+      Verdict::kWarn, what,
+      text(4, "the camera's mount on TF is wrong, or the floor is none: rpy of a camera link that looks along x is ",
+           std::atan2(R(2, 1), R(2, 2)), " ", -std::asin(std::clamp(R(2, 0), -1.0, 1.0)), " ",
+           std::atan2(R(1, 0), R(0, 0)), " rad with a right mount (mount_rpy, URDF)")};
 }
 
 }  // namespace sdvo

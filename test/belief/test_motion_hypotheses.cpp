@@ -99,7 +99,7 @@ TEST_F(Competition, LastingPointsOutweighAMajorityOfNewOnes) {
   const MotionHypothesis found = choose({0.5, 0.0});
   EXPECT_NEAR(found.motion.T_current_reference.translation().x(), 0.0, 1e-12);
   ASSERT_TRUE(found.rival);
-  EXPECT_EQ(found.rival->matches, 200);
+  EXPECT_EQ(found.rival->features.size(), 200U);
   EXPECT_NEAR(found.rival->probability + found.probability, 1.0, 1e-12);
   EXPECT_EQ(found.agreement.matches, 100) << "matches of a rival speak against nothing";
 }

@@ -59,6 +59,8 @@ TEST(MountCheck, ARightMountIsFine) {
   for (const double shake : {0.0, 1.0}) EXPECT_EQ(drive(mount(10.0), mount(10.0), 25.0, shake).verdict, Verdict::kOk);
   EXPECT_EQ(drive(mount(10.0), mount(9.8)).verdict, Verdict::kOk) << "as it is trusted";
   EXPECT_EQ(drive(mount(10.0, 3.0), mount(10.0), 0.0).verdict, Verdict::kOk) << "a straight way does not show a roll";
+  EXPECT_FALSE(contains(drive(mount(10.0, 3.0), mount(10.0), 0.0).what, "rolled")) << "… and it is not told";
+  EXPECT_FALSE(contains(drive(mount(10.0), mount(7.0), 0.0).what, "rolled"));
   EXPECT_EQ(MountCheck().judge(0.3).verdict, Verdict::kOpen);
 }
 
