@@ -266,7 +266,8 @@ TEST(Rooms, TheCoreAndItsToolboxKnowNoRos) {
           << include.file.string() << ":" << include.line << " includes " << include.header;
 }
 
-/// OpenCV's readers of image files, which cv_bridge brings as well, bring a hundred libraries into a robot's processes.
+/// OpenCV's readers of image files bring a hundred libraries into a robot's processes; cv_bridge, which has them as
+/// well, is for `messages` alone.
 TEST(Rooms, WhatRunsOnARobotReadsNoImageFilesWithOpenCv) {
   for (const std::string room :
        {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places", "config", "ros"})
