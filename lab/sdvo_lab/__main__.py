@@ -10,7 +10,7 @@ COMMANDS = {
     "faults": ("faults", "faults put into drives: what the odometry says of them"),
     "outages": ("outages", "drives blinded for a while: is the map found again, and only there?"),
     "ablate": ("ablate", "the odometry without one of its mechanisms"),
-    "benchmark": ("benchmark", "time of kernels, drives and nodelets"),
+    "benchmark": ("benchmark", "cost of a pair: instructions, CPU time, latency"),
     "places": ("places", "recognised revisits and false loops of long drives"),
     "self-check": ("self_check", "the self-checks of run_sequence against the ground truth"),
     "experiments": ("experiments", "the paper's experiments"),

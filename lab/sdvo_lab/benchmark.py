@@ -1,7 +1,7 @@
-"""Measures the time of the kernels, of whole drives and of the nodelets, and writes it between the marks of docs/precision.md, some
-five minutes on a machine that has nothing else to do. Instructions are counted, whatever else runs. Needs scripts/build run_sequence
-evaluate_trajectory count_allocations benchmark_kernels measure_latency convert render_drive; for the kernels Google Benchmark (Debian
-and Ubuntu: libbenchmark-dev; then scripts/build --force-cmake); for instructions valgrind; for drives KITTI_DIR and EUROC_DIR."""
+"""Measures what a pair costs and writes it between the marks of docs/precision.md, some ten minutes. Instructions are exact whatever else runs; CPU
+times are the least of three runs in turn, on one thread. Needs scripts/build run_sequence evaluate_trajectory convert render_drive count_allocations
+benchmark_kernels measure_latency; for the kernels Google Benchmark (Debian and Ubuntu: libbenchmark-dev; then scripts/build --force-cmake); for
+instructions valgrind; for drives KITTI_DIR and EUROC_DIR."""
 import json
 import os
 import pathlib
@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 
-from . import drives, marks, odometry, programs
+from . import drives, guises, marks, odometry, programs
 
 KERNELS = {
     "fastCorners": "FAST corners of an image (plain: cv::FAST)",
@@ -44,93 +44,125 @@ def kernels():
         yield [words, f"{plain:.2f}", f"{vectors:.2f}", f"{plain / vectors:.1f}"]
 
 
-def timed(drive, *arguments, runs=3):
-    """Medians over some runs of CPU, median and 95th percentile of the wall time (ms a pair), and the last run."""
-    all_runs = [odometry.run(drive.directory, *arguments) for _ in range(runs)]
-    times = [[float(x) for x in re.search(r"median ([\d.]+) ms, p95 ([\d.]+) ms, CPU ([\d.]+)", run.said).groups()] for run in all_runs]
-    wall, p95, cpu = (statistics.median(column) for column in zip(*times))
-    return (cpu, wall, p95), all_runs[-1]
+RUNS = 3
 
 
-def cells(times):
-    return [f"{time:.1f}" for time in times]
+def cpu_times(chosen, *arguments):
+    """CPU time of a pair on one thread, ms, of each drive: the least of some runs, in turn, as other programs of the machine make it longer."""
+    runs = [[float(re.search(r"CPU ([\d.]+)", odometry.run(drive.directory, "--threads", "1", *arguments).said)[1]) for drive in chosen]
+            for _ in range(RUNS)]
+    return [min(times) for times in zip(*runs)]
 
 
-def drive_table(folder):
-    yield ["drive", "threads", "CPU [ms a pair]", "wall, median", "wall, p95"]
-    names = [("kitti", "06"), ("kitti", "01"), *(("euroc", name) for name in drives.recorded_names("euroc"))]
-    for drive in (drives.recorded(kind, name, folder) for kind, name in names):
-        for threads in (1, 2):
-            yield [drive.name, threads, *cells(timed(drive, "--threads", threads)[0])]
-
-
-def in_a_room(folder):
-    """Somebody walks through a room with the cameras that robots carry."""
-    return {f"hand_held, {rig}, {size}": drives.rendered(folder, "hand_held", rig, 1, pairs=100, noise=2, exposure=0.3, motion_blur=0.01)
-            for rig, size in (("d435_small", "424x240"), ("oak_d", "640x400"))}
-
-
-def small_images(folder):
-    yield ["drive", "CPU [ms a pair]", "wall, median", "wall, p95", "CPU, KITTI 06 = 1", "p95 by median"]
-    chosen = {"KITTI 06, 1226x370": drives.recorded("kitti", "06"), **in_a_room(folder)}
-    whole = None
-    for name, drive in chosen.items():
-        (cpu, wall, p95), _ = timed(drive)
-        whole = whole or cpu
-        yield [name, *cells((cpu, wall, p95)), f"{cpu / whole:.2f}", f"{p95 / wall:.2f}"]
+def scenes(folder):
+    """By name: a car, a drone, and rooms through which somebody carries the cameras of robots."""
+    effects = {"pairs": 100, "noise": 2, "exposure": 0.3, "motion_blur": 0.01}
+    recorded = {f"{drive.name}, {size}": drive for drive, size in ((drives.recorded("kitti", "06"), "1226x370"),
+                                                                  (drives.recorded("euroc", "MH_01_moving", folder), "752x480"))}
+    return {**recorded, "room, 848x480": drives.rendered(folder, "hand_held", "d435", 71, **effects),
+            "room, 424x240": drives.rendered(folder, "hand_held", "d435_small", 71, **effects),
+            "hovering, 424x240": drives.rendered(folder, "hover", "d435_small", 503, **effects)}
 
 
 SIDES = ("sdvo::FeatureExtractor::extract(*", "sdvo::VisualOdometry::update(*")
+FIRST, LAST = 6, 22  # pairs whose instructions are counted: the map has begun
+# Functions with all that they call, summed.
+STAGES = {
+    "image side": ["FeatureExtractor::extract"],
+    "… corners": ["FeatureDetector::detect"],
+    "… the right image searched": ["StereoMatcher::match"],
+    "… descriptors": ["StereoDescriptor::describe"],
+    "… patches": ["PatchCutter::PatchCutter", "PatchCutter::cut"],
+    "motion side": ["VisualOdometry::update"],
+    "… matches, search, alignment": ["MotionSearch::find"],
+    "… window": ["LocalMap::adjust"],
+    "… … its covariances": ["WindowOptimizer::Solver::covariances"],
+    "… rig": ["LearntRig::learn", "LearntRig::shownRotation", "RightCameraDelay::learn"],
+}
+
+
+def callgrind(drive, sides, pairs, file, *arguments, dump=()):
+    """Writes what these functions execute on the first pairs to a file, and before each call of `dump` to file.1, file.2 …"""
+    subprocess.run(["valgrind", "--tool=callgrind", f"--callgrind-out-file={file}", *(f"--toggle-collect={side}" for side in sides),
+                    *(f"--dump-before={function}" for function in dump), programs.program("run_sequence"), drive.directory, "--frames", str(pairs),
+                    "--poses", f"{file}_poses.txt", "--threads", "1", *arguments],
+                   check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def counted(drive, sides, pairs, *arguments):
     """Instructions on these sides, functions, of each of the first pairs."""
     with tempfile.TemporaryDirectory() as work:
-        subprocess.run(["valgrind", "--tool=callgrind", f"--callgrind-out-file={work}/part", *(f"--toggle-collect={side}" for side in sides),
-                        "--dump-before=sdvo::OfflineRun::process(*", programs.program("run_sequence"), drive.directory, "--frames", str(pairs),
-                        "--poses", f"{work}/poses.txt", "--threads", "1", *arguments],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        callgrind(drive, sides, pairs, f"{work}/part", *arguments, dump=["sdvo::OfflineRun::process(*"])
         # The first part ends before the first pair, the last one has no number.
         parts = sorted(pathlib.Path(work).glob("part.*"), key=lambda part: int(part.suffix[1:]))[1:] + [pathlib.Path(work) / "part"]
         return [int(re.search(r"^totals: (\d+)", part.read_text(), re.MULTILINE).group(1)) for part in parts]
 
 
-def stored(name):
-    """The figures that the page has of this table, by the first cell of their rows."""
-    rows = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", marks.PERFORMANCE.read_text(), re.DOTALL).group(1).splitlines()[2:]
-    return {cells[0]: cells for cells in ([cell.strip() for cell in row.strip("| ").split("|")] for row in rows)}
+def inclusive(drive, pairs):
+    """Instructions of functions and of all that they call on the first pairs, by name; the most of those of one name."""
+    found = {}
+    with tempfile.TemporaryDirectory() as work:
+        callgrind(drive, SIDES, pairs, f"{work}/part")
+        said = subprocess.run(["callgrind_annotate", "--inclusive=yes", "--threshold=100", f"{work}/part"], check=True, stdout=subprocess.PIPE,
+                              universal_newlines=True).stdout
+    for number, name in re.findall(r"^ *([\d,]+) (?:\([^)]*\) +)?\S+?:sdvo::([\w:]+)\(", said, re.MULTILINE):
+        found[name] = max(found.get(name, 0), int(number.replace(",", "")))
+    return found
 
 
-def instructions(folder):
-    """Millions of a pair, and their ratio to what the page had before."""
-    yield ["drive", "image side", "motion side", "a pair", "p95 by median", "by the figure before"]
-    before = stored("instructions")
-    chosen = {"KITTI 06": drives.recorded("kitti", "06"), "EuRoC MH_01_half": drives.recorded("euroc", "MH_01_half", folder), **in_a_room(folder)}
-    for name, drive in chosen.items():
-        counts = [counted(drive, [side], 30)[2:] for side in SIDES]
-        sides = [statistics.mean(side) * 1e-6 for side in counts]
-        whole = sorted(map(sum, zip(*counts)))
-        ratio = sum(sides) / float(before[name][3]) if name in before else 1.0
-        yield [name, *(f"{million:.1f}" for million in (*sides, sum(sides))), f"{whole[int(0.95 * len(whole))] / statistics.median(whole):.2f}",
-               f"{ratio:.2f}"]
+def by_stage(drive):
+    """Millions of a pair."""
+    until, before = inclusive(drive, LAST), inclusive(drive, FIRST)
+    return {stage: 1e-6 * sum(until.get(name, 0) - before.get(name, 0) for name in names) / (LAST - FIRST) for stage, names in STAGES.items()}
 
 
-def guard(rows):
-    """Fails where a drive takes more than 5 % more instructions than the page has."""
-    grown = [line for line in rows[2:] if float(line.strip("| ").split("|")[-1]) > 1.05]
-    if grown:
-        sys.exit("error: more instructions than before\n" + "\n".join(grown))
+def cost(folder):
+    """Columns are scenes: what is in them, CPU time, and millions of instructions of a pair by stage."""
+    chosen = scenes(folder)
+    yield ["mean over pairs", *chosen]
+    timing = [odometry.run(drive.directory).timing[FIRST:] for drive in chosen.values()]
+    for column in ("features", "matches", "inliers"):
+        yield [column, *(f"{statistics.mean(int(row[column]) for row in rows):.0f}" for rows in timing)]
+    yield ["CPU time, one thread [ms]", *(f"{ms:.1f}" for ms in cpu_times(list(chosen.values())))]
+    with programs.pool() as pool:
+        of_scenes = list(pool.map(by_stage, chosen.values()))
+    for stage in STAGES:
+        yield [f"{stage} [M]", *(f"{of[stage]:.1f}" for of in of_scenes)]
 
 
-def growth(folder):
-    yield ["corners", *(cell for name in ("KITTI 06", "MH_01_half") for cell in (f"{name} [millions]", "t [%]", "r [deg/m]"))]
-    chosen = [drives.recorded("kitti", "06"), drives.recorded("euroc", "MH_01_half", folder)]
-    for count in (300, 450, 600, 1100):
-        row, setting = [count], ["--param", f"detector/max_features={count}"]
-        for drive in chosen:
-            mean = odometry.errors(drive.truth, odometry.run(drive.directory, *setting).poses, drive.lengths)["mean"]
-            millions = statistics.mean(counted(drive, SIDES, 30, *setting)[2:]) * 1e-6
-            row += [f"{millions:.1f}", f"{mean['translation_percent']:.3f}", f"{mean['rotation_deg_per_m']:.4f}"]
+def errors(drive, *setting):
+    """A cell."""
+    mean = odometry.errors(drive.truth, odometry.run(drive.directory, *setting).poses, drive.lengths)["mean"]
+    return f"{mean['translation_percent']:.2f}, {mean['rotation_deg_per_m']:.4f}"
+
+
+def compared(folder):
+    """Scenes on which settings are compared."""
+    return {name: drive for name, drive in scenes(folder).items() if "KITTI" in name or "424x240" in name}
+
+
+def corners(folder):
+    """What more corners cost and bring."""
+    chosen = compared(folder)
+    yield ["max_features", *(cell for name in chosen for cell in (f"{name} [M]", "t [%], r [deg/m]"))]
+    for number in (400, 600, 900):
+        row, setting = [number], ("--param", f"detector/max_features={number}")
+        for drive in chosen.values():
+            row += [f"{1e-6 * statistics.mean(counted(drive, SIDES, LAST, *setting)[FIRST:]):.1f}", errors(drive, *setting)]
+        yield row
+
+
+def rates(folder):
+    """What fewer pairs a second, which cost less in proportion, do to the errors: t [%], r [deg/m]."""
+    chosen = compared(folder)
+    yield ["max_rate", *chosen]
+    for words, guise in (("all pairs", "as_recorded"), ("half", "every_2nd"), ("a third", "every_3rd")):
+        row = [words]
+        for drive in chosen.values():
+            with tempfile.TemporaryDirectory() as work:
+                thinned = pathlib.Path(work) / guise
+                guises.write_guise(drive, guise, thinned)
+                row.append(errors(drives.Drive(drive.name, thinned, thinned / "poses.txt", drive.lengths)))
         yield row
 
 
@@ -158,7 +190,7 @@ def latency(_):
             master.wait()
 
 
-TABLES = {"instructions": instructions, "drives": drive_table, "small_images": small_images, "growth": growth, "allocations": allocations, "latency": latency}
+TABLES = {"cost": cost, "corners": corners, "rates": rates, "allocations": allocations, "latency": latency}
 
 PRINTED_ALONE = ("kernels", "allocations")  # no page has them
 
@@ -180,6 +212,4 @@ def main(arguments):
                     marks.put(arguments.write, name, machine())
             else:
                 page = arguments.write if name not in PRINTED_ALONE else None
-                rows = marks.show(kernels() if name == "kernels" else TABLES[name](folder), page, name)
-                if name == "instructions" and not arguments.write:
-                    guard(rows)
+                marks.show(kernels() if name == "kernels" else TABLES[name](folder), page, name)
