@@ -13,12 +13,19 @@ import rosparam  # noqa: F401 reads !degrees and !radians for yaml
 import yaml
 
 BLOCKS = ('stereo_features', 'visual_odometry', 'place_recognition', 'features_image')
+# Options that users look for among the arguments.
+OPTIONS = ('stereo_features/detector/mask', 'stereo_features/detector/max_features', 'stereo_features/find_camera', 'stereo_features/max_rate',
+           'visual_odometry/initial_pose', 'visual_odometry/planar', 'visual_odometry/publish_null_when_lost',
+           'place_recognition/robot_name', 'place_recognition/save_at_shutdown')
 LARGEST = 1000000  # bytes, of options
 LONGEST = 60  # s that a launch takes to read the copy
 
 
 def without_empty(value):
-    return {k: without_empty(v) for k, v in value.items() if v is not None} if isinstance(value, dict) else value
+    if not isinstance(value, dict):
+        return value
+    inner = {key: without_empty(v) for key, v in value.items()}
+    return {key: v for key, v in inner.items() if v is not None and v != {}}
 
 
 def warn(path, problem):
@@ -54,6 +61,11 @@ def check(value, name):
         raise ValueError('%s = %s does not fit into 32 bits' % (name[:-1], value))
 
 
+def as_yaml(path):
+    *blocks, option = path.split('/')
+    return ''.join(block + ': {' for block in blocks) + option + ': VALUE' + '}' * len(blocks)
+
+
 def refuse_unknown_arguments():
     """Of `roslaunch stereo_descriptor_vo FILE name:=value`, from which `roslaunch` leaves out names that the file lacks."""
     with open('/proc/%d/cmdline' % os.getppid()) as file:
@@ -66,6 +78,9 @@ def refuse_unknown_arguments():
         known = [argument.get('name') for argument in arguments if argument.get('value') is None]
         for name in (word.split(':=')[0] for word in words if ':=' in word and not word.startswith('__')):
             if name not in known:
+                option = [path for path in OPTIONS if path.endswith('/' + name)]
+                if option:
+                    sys.exit('ERROR: %s has no argument %s: in the file of config:= it is %s' % (file, name, as_yaml(option[0])))
                 alike = difflib.get_close_matches(name, known, 1)
                 sys.exit('ERROR: %s has no argument %s%s; roslaunch --ros-args stereo_descriptor_vo %s lists them' % (
                     file, name, ': is it %s?' % alike[0] if alike else '', file))
@@ -96,12 +111,13 @@ def main(path, copy):
             raise ValueError('it is too large for options')
         with open(path) as file:
             text = file.read()
-        config = without_empty(yaml.safe_load(text) or {})
-        if not isinstance(config, dict):
+        whole = yaml.safe_load(text) or {}
+        if not isinstance(whole, dict):
             raise ValueError('it has no blocks such as "stereo_features:"')
+        config = without_empty(whole)
         check(config, '')
         name_duplicates(path, yaml.compose(text, yaml.SafeLoader))
-        for block in config:
+        for block in whole:
             if block not in BLOCKS:
                 warn(path, '%s is of no nodelet here and has no effect on them: their blocks are %s' % (block, ', '.join(BLOCKS)))
         with open(copy, 'x') as file:

@@ -45,7 +45,7 @@ class Faults(PipelineCase):
         """Its stamps begin again near zero while the system's clock goes on, and a map is loaded."""
         file = os.path.join(self.folder(), 'map.bag')
         config = self.config('place_recognition: {keyframe_distance: 0.1, keyframe_angle: 5.0}\n')
-        self.start(config=config, loop_closing='true', queue_size=5, odometry_queue_size=5)
+        self.start(config=config, loop_closing='true', queue_size=5)
         places = self.listen('place_info', PlaceInfo)
         for i in range(30):
             self.feed(i)
@@ -54,7 +54,7 @@ class Faults(PipelineCase):
         self.tearDown()
         self.setUp()
 
-        self.start(config=config, loop_closing='true', places_file=file, queue_size=5, odometry_queue_size=5)
+        self.start(config=config, loop_closing='true', places_file=file, queue_size=5)
         places = self.listen('place_info', PlaceInfo)
         for i in range(20):
             self.assertEqual(self.feed(i).state, 'TRACKING')
@@ -325,7 +325,7 @@ class Faults(PipelineCase):
         self.tearDown()
         self.setUp()
 
-        front = pipeline(Camera(self.namespace + '/front', self.sequence, self.clock), find_camera='false')
+        front = pipeline(Camera(self.namespace + '/front', self.sequence, self.clock), config=self.config(''.join('%s: {find_camera: false}\n' % block for block in ('stereo_features', 'features_image'))))
         self.until(lambda: ('out', self.namespace + '/stereo_features', rospy.get_name()) in links(
             self.namespace + '/stereo_vo_manager'))
         time.sleep(3.0)

@@ -158,7 +158,7 @@ class FilterTest(PipelineCase):
         cls.recipes = recipes()
 
     def begin(self, **arguments):
-        self.start(publish_tf='false', odometry_queue_size=100, **arguments)
+        self.start(publish_tf='false', queue_size=100, **arguments)
         self.poses = self.collect('pose', PoseWithCovarianceStamped)
         self.resets = self.collect('set_pose', PoseWithCovarianceStamped)
         node = subprocess.Popen(['rosrun', PACKAGE, 'filter_reset.py', '__ns:=' + self.namespace])
@@ -231,7 +231,7 @@ class FilterTest(PipelineCase):
 
     def test_with_an_imu(self):
         """Of rates alone, with twists, which know nothing of where they begin; as poses relative to their beginning."""
-        self.begin(initial_pose='3 -2 0 0 0 0')
+        self.begin(config=self.config('visual_odometry: {initial_pose: 3 -2 0 0 0 0}'))
         ekf, with_default_noise = Filter(self.recipes[1], noise_of_twists()), Filter(self.recipes[1])
         relative = Filter(dict(self.recipes[1], odom0_config=self.recipes[0]['odom0_config'], odom0_relative=True))
         odometry, _ = self.drive(0, 14)
@@ -286,7 +286,7 @@ class FilterTest(PipelineCase):
         self.assertGreater(slip_without, 0.07)
 
     def test_odometry_of_zeros_while_lost_moves_no_filter(self):
-        self.begin(publish_null_when_lost='true')
+        self.begin(config=self.config('visual_odometry: {publish_null_when_lost: true}'))
         self.drive(0, 6)
         self.lose(6)
         self.until(lambda: self.odometry[-1].pose.covariance[0] == 9999.0)

@@ -32,15 +32,11 @@ from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
 # Under the nodelets' names; what an argument of the launch file can set.
 ARGUMENTS = {'odom_frame_id': 'visual_odometry/odom_frame_id', 'base_frame_id': 'visual_odometry/base_frame_id',
-             'initial_pose': 'visual_odometry/initial_pose', 'mask': 'stereo_features/detector/mask',
-             'publish_tf': 'visual_odometry/publish_tf', 'approximate_sync': 'stereo_features/approximate_sync',
-             'sync_tolerance': 'stereo_features/sync_tolerance', 'sync_queue_size': 'stereo_features/sync_queue_size',
-             'image_transport': 'stereo_features/image_transport', 'guess_frame_id': 'visual_odometry/guess_frame_id',
-             'publish_null_when_lost': 'visual_odometry/publish_null_when_lost', 'queue_size': 'stereo_features/queue_size', 'odometry_queue_size': 'visual_odometry/queue_size'}
-IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'initial_pose': '1 2 3 0 0 0', 'mask': '/in/yaml.png',
-           'publish_tf': False, 'approximate_sync': True,
-           'sync_tolerance': 0.002, 'sync_queue_size': 30, 'image_transport': 'compressed', 'guess_frame_id': 'wheel_odom',
-           'publish_null_when_lost': True, 'queue_size': 7, 'odometry_queue_size': 8}
+             'publish_tf': 'visual_odometry/publish_tf', 'use_imu': 'visual_odometry/use_imu', 'guess_frame_id': 'visual_odometry/guess_frame_id',
+             'approximate_sync': 'stereo_features/approximate_sync', 'sync_tolerance': 'stereo_features/sync_tolerance',
+             'image_transport': 'stereo_features/image_transport', 'queue_size': 'stereo_features/queue_size'}
+IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'publish_tf': False, 'use_imu': True, 'guess_frame_id': 'wheel_odom',
+           'approximate_sync': True, 'sync_tolerance': 0.002, 'image_transport': 'compressed', 'queue_size': 7}
 
 
 FOLDER = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), 'launch')
@@ -77,6 +73,12 @@ def parameters(**arguments):
     return {name[len('/stereo/'):]: value for name, value in dump.items() if name.startswith('/stereo/')}
 
 
+def refusal(*arguments):
+    """Of a command line with stereo_vo.launch."""
+    command = ['roslaunch', '--dump-params', PACKAGE, 'stereo_vo.launch'] + list(arguments)
+    return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, universal_newlines=True).stderr
+
+
 class Launch(unittest.TestCase):
     def test_including_files_have_all_arguments_of_the_inner_ones(self):
         for file in launch_files():
@@ -93,18 +95,16 @@ class Launch(unittest.TestCase):
                     if 'doc' not in outer[name] and 'default' in inner[name]:
                         self.assertEqual(outer[name]['default'], inner[name]['default'], '%s: %s' % (what, name))
 
-    def test_parameters_that_users_change_first_are_arguments(self):
+    def test_parameters_that_users_change_first_are_arguments_or_named(self):
         with open(os.path.join(FOLDER, '..', 'docs', 'parameters.md')) as text:
             first = text.read().split('\n| --- |')[1].split('\n\n')[0]
         names = [line.split('`')[1].split('/')[-1] for line in first.splitlines() if '`' in line]
         self.assertEqual(len(names), 10)
-        self.assertEqual(set(names) - set(arguments_of('stereo_vo.launch')), set())
-        given = load('stereo_vo.launch', max_features='700', max_rate='15', planar='true', use_imu='true').params
-        self.assertEqual({name: given['/stereo/' + name] for name in
-                          ('stereo_features/detector/max_features', 'stereo_features/max_rate', 'visual_odometry/planar',
-                           'visual_odometry/use_imu')},
-                         {'stereo_features/detector/max_features': 700, 'stereo_features/max_rate': 15,
-                          'visual_odometry/planar': True, 'visual_odometry/use_imu': True})
+        for name in set(names) - set(arguments_of('stereo_vo.launch')):
+            self.assertIn(': in the file of config:= it is ', refusal(name + ':=1'))
+
+    def test_arguments_are_few(self):
+        self.assertEqual({file: len(arguments_of(file)) for file in launch_files() if len(arguments_of(file)) > 25}, {})
 
     def test_a_drive_is_recorded_on_request_alone(self):
         self.assertNotIn('/stereo/recorder', nodes(load('stereo_vo.launch')))
@@ -168,7 +168,7 @@ class Launch(unittest.TestCase):
         for file in launch_files():
             for node in xml.etree.ElementTree.parse(os.path.join(FOLDER, file)).getroot().iter('node'):
                 if 'load stereo_descriptor_vo' in node.get('args', '') and node.get('launch-prefix'):
-                    self.assertEqual(node.get('clear_params'), '$(arg clear_params)', '%s: %s' % (file, node.get('name')))
+                    self.assertEqual(node.get('clear_params'), 'true', '%s: %s' % (file, node.get('name')))
 
     def test_a_python_without_ros_modules_may_come_first_on_path(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -196,26 +196,20 @@ class Launch(unittest.TestCase):
 
     def test_a_filter_that_publishes_tf_gets_all_of_it(self):
         for file in ('stereo_vo.launch', 'stereo_raw.launch', 'mavros.launch', 'cameras/oak_d.launch'):
-            for both, map_alone, expected in (('false', '', False), ('false', 'true', True), ('true', '', True)):
-                given = {'publish_map_tf': map_alone} if map_alone else {}
-                config = load(file, loop_closing='true', publish_tf=both, **given)
-                name = next(name for name in config.params if name.endswith('/place_recognition/publish_tf'))
-                self.assertEqual(config.params[name], expected, (file, given))
+            for both, in_yaml, expected in (('false', None, False), ('false', True, True), ('true', None, True)):
+                with tempfile.NamedTemporaryFile('w', suffix='.yaml') as config:
+                    yaml.safe_dump({'place_recognition': {'publish_tf': in_yaml}}, config)
+                    config.flush()
+                    found = load(file, loop_closing='true', publish_tf=both, config=config.name).params
+                self.assertEqual(found['/%s/place_recognition/publish_tf' % ('oak' if 'oak' in file else 'stereo')], expected, (file, in_yaml))
 
     def test_rviz_on_demand(self):
         for file in ('stereo_vo.launch', 'mavros.launch', 'cameras/zed.launch'):
             self.assertEqual([name for name in nodes(load(file)) if 'rviz' in name], [])
-            found = load(file, rviz='true', namespace='front', loop_closing='true', map_frame_id='site')
-            rviz = nodes(found)['/front/rviz']
-            self.assertTrue(rviz.args.endswith('/places.rviz" -f site'), rviz.args)
-
-    def test_required_nodes_and_where_their_messages_go(self):
-        for file, needed in (('stereo_vo.launch', {}), ('cameras/zed.launch', {}), ('stereo_raw.launch', {})):
-            for given, required, output in (({}, False, 'screen'), ({'required': 'true', 'output': 'log'}, True, 'log')):
-                found = {node.name: node for node in load(file, loop_closing='true', **needed, **given).nodes}
-                for name in ('stereo_vo_manager', 'stereo_features', 'visual_odometry', 'place_recognition'):
-                    self.assertEqual((found[name].required, found[name].output), (required, output), (file, name))
-                self.assertFalse(found['features_image'].required, 'only shown')
+            for view, expected in (('true', 'places'), ('example_robot', 'example_robot')):
+                found = load(file, rviz=view, namespace='front', loop_closing='true', map_frame_id='site')
+                rviz = nodes(found)['/front/rviz']
+                self.assertTrue(rviz.args.endswith('/%s.rviz" -f site' % expected), rviz.args)
 
     def test_the_transport_of_raw_images_is_not_that_of_rectified_ones(self):
         found = load('stereo_raw.launch', image_transport='compressed').params
@@ -284,9 +278,7 @@ class Launch(unittest.TestCase):
 
     def test_arguments_that_a_file_lacks_are_refused(self):
         """By a command line, which `roslaunch` itself does not check."""
-        def refusal(*arguments):
-            command = ['roslaunch', '--dump-params', PACKAGE, 'stereo_vo.launch'] + list(arguments)
-            return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, universal_newlines=True).stderr
+        self.assertIn('no argument mask: in the file of config:= it is stereo_features: {detector: {mask: VALUE}}', refusal('mask:=/arm.png'))
         self.assertIn('stereo_vo.launch has no argument mount_rpy', refusal('mount_rpy:=0 0 0.5 0 0 0'))
         self.assertIn('no argument base_frame: is it base_frame_id?', refusal('base_frame:=base_footprint'))
         self.assertNotIn('no argument', refusal('base_frame_id:=base_footprint', '__log:=/tmp/x'))
@@ -336,35 +328,27 @@ class Launch(unittest.TestCase):
 
     def test_another_robot_is_named_from_the_root_on(self):
         for other in ('r2', '/r2', '/r2/'):
-            node = nodes(load('stereo_vo.launch', loop_closing='true', other=other))['/stereo/place_recognition']
+            node = nodes(load('place_recognition.launch', other=other))['/stereo/place_recognition']
             self.assertIn('/r2/place_signature', [to for _, to in node.remap_args])
 
     def test_loop_closing_passes_its_arguments_on(self):
-        found = parameters(loop_closing='true', map_frame_id='site', publish_map_tf='false', places_file='/site.bag',
-                           save_at_shutdown='true',
-                           robot_name='one', places_queue_size='40')
-        self.assertEqual({name: value for name, value in found.items() if value != {}},
-                         {'place_recognition/' + name: value for name, value in
-                          (('map_frame_id', 'site'), ('publish_tf', False), ('places_file', '/site.bag'),
-                           ('save_at_shutdown', True), ('robot_name', 'one'),
-                           ('sync_queue_size', 40), ('queue_size', 40))})
+        found = parameters(loop_closing='true', map_frame_id='site', places_file='/site.bag')
+        self.assertEqual(found, {'place_recognition/map_frame_id': 'site', 'place_recognition/places_file': '/site.bag'})
 
-    def test_parameters_of_an_earlier_run_are_forgotten_unless_they_are_wanted(self):
+    def test_parameters_of_an_earlier_run_are_forgotten(self):
         stale, other = '/stereo/visual_odometry/publish_tf', '/stereo/camera/exposure'
-        for clear in ('false', None):
-            rospy.set_param(stale, False)
-            rospy.set_param(other, 5)
-            # Without a manager the nodelets wait: nothing is started.
-            process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'start_manager:=false',
-                                        'base_frame_id:=robot'] + (['clear_params:=' + clear] if clear else []))
-            try:
-                self.assertTrue(wait_until(lambda: rospy.get_param('/stereo/visual_odometry/base_frame_id', '') == 'robot'))
-                self.assertEqual(rospy.has_param(stale), clear == 'false')
-                self.assertEqual(rospy.get_param(other), 5)
-            finally:
-                process.terminate()
-                process.wait()
-            rospy.delete_param('/stereo')
+        rospy.set_param(stale, False)
+        rospy.set_param(other, 5)
+        # Without a manager the nodelets wait: nothing is started.
+        process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'start_manager:=false', 'base_frame_id:=robot'])
+        try:
+            self.assertTrue(wait_until(lambda: rospy.get_param('/stereo/visual_odometry/base_frame_id', '') == 'robot'))
+            self.assertFalse(rospy.has_param(stale))
+            self.assertEqual(rospy.get_param(other), 5)
+        finally:
+            process.terminate()
+            process.wait()
+        rospy.delete_param('/stereo')
 
     def session(self):
         """(session, epoch) of the odometry that answers a message of ours; None where none does."""
@@ -421,8 +405,8 @@ class Launch(unittest.TestCase):
         names.wait_for_service(60)
 
 
-        def launch(**arguments):
-            return subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'manager:=driver', 'start_manager:=false'] +
+        def launch(file='stereo_vo.launch', **arguments):
+            return subprocess.Popen(['roslaunch', '--wait', PACKAGE, file, 'manager:=driver', 'start_manager:=false'] +
                                     ['%s:=%s' % item for item in arguments.items()], stderr=subprocess.PIPE,
                                     universal_newlines=True, start_new_session=True)
 
@@ -438,14 +422,14 @@ class Launch(unittest.TestCase):
         self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine, 60), names().nodelets)
         kill(first)
         self.assertTrue(wait_until(lambda: names().nodelets == [], 60), names().nodelets)
-        second = launch(bond='false')
-        self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine, 60), names().nodelets)
+        second = launch('odometry.launch', bond='false')
+        self.assertTrue(wait_until(lambda: names().nodelets == mine[-1:], 60), names().nodelets)
         session = self.session()
         kill(second)
-        third = launch(bond='false')
+        third = launch('odometry.launch', bond='false')
         try:
             self.assertTrue(wait_until(lambda: self.session() not in (None, session), 60))
-            self.assertEqual(sorted(names().nodelets), mine)
+            self.assertEqual(names().nodelets, mine[-1:])
         finally:
             third.terminate()
         self.assertIn('/stereo/visual_odometry of an earlier launch is still in /stereo/driver: it is replaced',

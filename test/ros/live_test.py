@@ -100,7 +100,7 @@ class Live(PipelineCase):
 
     def test_malformed_features(self):
         """What is malformed is for the view's own test."""
-        self.start(odometry_queue_size=100)
+        self.start(queue_size=100)
         publisher = self.publisher('stereo_features', StereoFeatures)
         for i in range(3):
             self.assertEqual(self.feed(i).state, 'TRACKING')
@@ -213,7 +213,7 @@ class Live(PipelineCase):
 
     def test_lasting_jumps_of_the_stamps_go_on_in_the_map_and_lose_nothing(self):
         """As where the camera's or the system's clock is set: the images go on."""
-        self.start(queue_size=2, odometry_queue_size=2)  # the pair held back and the next one come at once
+        self.start(queue_size=2)  # the pair held back and the next one come at once
         jumps = {5: -37.0, 10: 3600.0}  # s, by the pair that is the first with it
         jump, i = 0.0, 0
         while i < PAIRS:
@@ -267,7 +267,7 @@ class Live(PipelineCase):
 
     def test_extreme_stamps(self):
         """Every subscriber of the pipeline gets them."""
-        self.start(odometry_queue_size=100)  # none pushes another one out
+        self.start(queue_size=100)  # none pushes another one out
         self.listen('features_image', Image)
         features, flow = self.publisher('stereo_features', StereoFeatures), self.publisher('feature_flow', FeatureFlow)
         tf = self.publisher('/tf', TFMessage)
@@ -297,7 +297,7 @@ class Live(PipelineCase):
         self.assert_alive()
 
     def test_extreme_stamps_with_approximate_sync(self):
-        self.start(approximate_sync='true', queue_size=100, odometry_queue_size=100)
+        self.start(approximate_sync='true', queue_size=100)
         for i in range(5):  # approximate: a pair comes out when later ones show that none fits better
             self.camera.publish(*self.camera.messages(i))
         self.until(lambda: len(self.info) >= 3)
@@ -318,7 +318,7 @@ class Live(PipelineCase):
         self.assert_alive()
 
     def test_reset_service_goes_back_to_the_initial_pose(self):
-        self.start(initial_pose='10 5 0 0 0 1.5707963267948966')
+        self.start(config=self.config('visual_odometry: {initial_pose: 10 5 0 0 0 1.5707963267948966}'))
         path = self.listen('path', Path)
         before = [self.feed(i) for i in range(3)][-1]
         self.call('visual_odometry/reset', Empty)
@@ -719,7 +719,7 @@ class Live(PipelineCase):
         self.assertGreater(info.dropped_pairs, 0)
 
     def test_queues_as_long_as_a_recording_keep_every_pair(self):
-        self.start(queue_size=100, odometry_queue_size=100)
+        self.start(queue_size=100)
         for i in range(PAIRS):
             self.camera.publish(*self.camera.messages(i))
         self.until(lambda: len(self.info) == PAIRS)
@@ -797,7 +797,7 @@ class Live(PipelineCase):
         file = tempfile.NamedTemporaryFile(suffix='.png')
         self.addCleanup(file.close)
         cv2.imwrite(file.name, right)
-        self.start(mask=file.name)
+        self.start(config=self.config('stereo_features: {detector: {mask: %s}}' % file.name))
         self.assertGreater(self.feed(0).features, 100)
         self.assertGreater(min(self.features[-1].u), width // 2 - 2)
         publisher = self.publisher('left/mask', Image)

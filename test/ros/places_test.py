@@ -422,11 +422,15 @@ class Places(unittest.TestCase):
             with rosbag.Bag(path) as bag:
                 return bag.get_message_count(['place'])
 
+        saving = os.path.join(self.directory, 'saving.yaml')
+        with open(saving, 'w') as config:
+            config.write('place_recognition: {save_at_shutdown: true}')
+
         def run(pairs, act=lambda recognition: None, end=signal.SIGINT):
             robot = Robot(namespace, self.ring, self.clock)
             robot.session = rospy.Time(100 + next(starts))
             recognition = self.start(namespace, places_file=os.path.join(self.directory, '.', 'site.bag'),
-                                     save_at_shutdown='true')
+                                     config=saving)
             self.assertTrue(wait_until(recognition.is_connected, 60), 'it did not start')
             self.drive(robot, recognition, 2)
             act(recognition)
@@ -452,7 +456,7 @@ class Places(unittest.TestCase):
             self.assertEqual((count(file), count(other)), (kept, kept))
         os.remove(file)
         os.mkdir(file)
-        refused = self.start(namespace, places_file=file, save_at_shutdown='true')
+        refused = self.start(namespace, places_file=file, config=saving)
         self.assertTrue(wait_until(lambda: refused.rosout.said('it is no regular file'), 60))
 
     def test_a_reset_takes_the_mount_anew(self):

@@ -105,7 +105,7 @@ bool CameraFinder::update(const ros::master::V_TopicInfo& topics, std::string& r
   names_ = cameras.front();
   has_chosen_ = true;
   report += ": the only stereo camera in " + ns_ + " is taken, with " + names_.at("left/image_rect") + " and " +
-            names_.at("right/image_rect") + "; find_camera:=false for none";
+            names_.at("right/image_rect") + "; parameter find_camera false for none";
   return true;
 }
 
