@@ -85,6 +85,9 @@ struct OdometryOutputOptions {
   bool use_imu = false;
   double guess_timeout = 0.1;
   double guess_error = 0.1;
+  double guess_min_translation = 0.0;
+  double guess_min_rotation = 0.0;
+  double guess_min_time = 0.0;
   int queue_size = 1;
   bool overwrite = false;
   double max_silence = 2.0;
@@ -94,6 +97,16 @@ struct OdometryOutputOptions {
 
   /// Whether TF gets odom -> guess_frame_id, for base has that odometry's parent.
   bool correctsGuess() const { return publish_tf && !invert_tf && !guess_frame_id.empty(); }
+
+  /// Whether pairs are left out while the guess hardly moves.
+  bool awaitsMotion() const { return guess_min_translation > 0.0 || guess_min_rotation > 0.0; }
+
+  /// Whether the base moved so little (m, rad), and the last processed pair is so young (s), that the next is left out.
+  bool isLeftOut(double translation, double rotation, double age) const {
+    return awaitsMotion() && (guess_min_translation <= 0.0 || translation < guess_min_translation) &&
+           (guess_min_rotation <= 0.0 || rotation < guess_min_rotation) &&
+           (guess_min_time <= 0.0 || age < guess_min_time);
+  }
 
   void describe(OptionList& list) {
     list.add("odom_frame_id", odom_frame_id, "world-fixed frame of the odometry");
@@ -117,6 +130,13 @@ struct OdometryOutputOptions {
     list.add("guess_error", guess_error, {0.001, 1.0}, "ratio",
              "standard deviation of the guess's motions, of their distance and turn: the pose goes on by them while no "
              "images help");
+    list.add(
+        "guess_min_translation", guess_min_translation, {0.0, 10.0}, "m",
+        "by guess_frame_id: pairs are left out until the base has moved so far since the last one that was not, or "
+        "turned by guess_min_rotation; once it stands for a second, the images rest, too; 0: no such limit");
+    list.add("guess_min_rotation", guess_min_rotation, {0.0, 3.0}, "rad", "the same by the base's turn");
+    list.add("guess_min_time", guess_min_time, {0.0, 3600.0}, "s",
+             "a pair that is so much later than the last one is not left out; 0: no such limit");
     list.add("guess_timeout", guess_timeout, {0.0, 1.0}, "s",
              "wall time to wait for either at each pair; seldom once it did not come in time");
     list.add("queue_size", queue_size, {1, 1000}, "",

@@ -40,17 +40,22 @@ class PausableInput {
   }
   bool isPaused() const { return is_paused_; }
 
+  /// Unsubscribes, too, but is no pause: nothing happens before messages come again, and pauses go on beside it.
+  void setResting(bool resting) {
+    if (rests_.exchange(resting) != resting) worker_.push(!is_paused_ && !rests_);
+  }
+
  private:
   bool change(bool paused) {
     if (is_paused_.exchange(paused) == paused) return false;
-    worker_.push(!paused);
+    worker_.push(!is_paused_ && !rests_);
     return true;
   }
 
   const Subscribe subscribe_;
   const std::function<void()> before_resume_;
   std::vector<ros::Subscriber> subscribers_;  // after the constructor the worker's
-  std::atomic<bool> is_paused_{false};
+  std::atomic<bool> is_paused_{false}, rests_{false};
   Worker<bool> worker_;
 };
 

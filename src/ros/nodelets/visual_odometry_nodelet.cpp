@@ -74,6 +74,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     loadOptions(private_nh, options_, reconfigured_);
     if (options_.use_imu && !options_.guess_frame_id.empty())
       throw std::invalid_argument("use_imu and guess_frame_id exclude each other: set one of them");
+    if (options_.awaitsMotion() && options_.guess_frame_id.empty())
+      throw std::invalid_argument("guess_min_translation and guess_min_rotation need guess_frame_id: set it, too");
     checkFrames();
     for (std::string* frame : {&options_.odom_frame_id, &options_.base_frame_id, &options_.guess_frame_id})
       *frame = cleanFrameId(*frame);
@@ -125,6 +127,10 @@ class VisualOdometryNodelet : public RobotNodelet {
     // Without a subscriber the image side rests, too.
     input_ = std::make_unique<PausableInput>([this] { return subscribe(); }, [this] { resumes_.post({}); });
     servePauses(private_nh, *input_, diagnostics_->input(), "the motion in between is unknown");
+    if (!options_.awaitsMotion()) return;
+    ros::NodeHandle rest_nh = addThread().serve(getNodeHandle());
+    rest_timer_ = rest_nh.createWallTimer(ros::WallDuration(kRestPeriod),
+                                          [this](const ros::WallTimerEvent&) { restWhileStanding(); });
   }
 
   std::vector<ros::Subscriber> subscribe() {
@@ -196,6 +202,13 @@ class VisualOdometryNodelet : public RobotNodelet {
     const Guess guess = waitForOthers(passed);
     const std::lock_guard<std::mutex> lock(work_mutex_);
     if (passed.item.starts != starts_) return;
+    if (std::exchange(rests_, false)) diagnostics_->input().noteIdle("");
+    if (const ros::Time stamp = passed.item.message->header.stamp;
+        guess.T_guess_base && isLeftOut(*guess.T_guess_base, stamp)) {
+      diagnostics_->input().note(nanoseconds(stamp));
+      publisher_->sendCorrection(stamp);
+      return unused_->noteUsed();
+    }
     const WorkLoad::Item work(diagnostics_->load());
     publishInfo(estimate(passed, guess), *passed.item.message);
     unused_->noteUsed();
@@ -207,7 +220,37 @@ class VisualOdometryNodelet : public RobotNodelet {
   struct Guess {
     std::optional<ros::Time> since;
     std::optional<MotionGuess> motion;
+    std::optional<Eigen::Isometry3d> T_guess_since, T_guess_base;  ///< then and now, only where pairs may be left out
   };
+
+  /// Whether the base has hardly moved since the last processed pair, in which the odometry was sure.
+  bool isLeftOut(const Eigen::Isometry3d& T_guess_base, const ros::Time& stamp) const {
+    if (!T_guess_processed_ || !processed_stamp_) return false;
+    const Eigen::Isometry3d motion = T_guess_processed_->inverse() * T_guess_base;
+    return options_.isLeftOut(motion.translation().norm(), Eigen::AngleAxisd(motion.linear()).angle(),
+                              secondsBetween(*processed_stamp_, stamp));
+  }
+
+  /// Unsubscribes the features while pairs would be left out, so that the image side rests, too. Not where the guess is
+  /// old: it may have ended.
+  void restWhileStanding() {
+    const std::lock_guard<std::mutex> lock(work_mutex_);
+    const auto T_guess_base = [this](const ros::Time& time) {
+      std::string ignored;
+      return transforms_->find(options_.guess_frame_id, options_.base_frame_id, ignored, time);
+    };
+    const ros::Time now = ros::Time::now();
+    const bool is_fresh = now.toSec() > kStanding && T_guess_base(now - ros::Duration(kStanding));
+    const auto newest = T_guess_base(ros::Time(0));
+    const bool stands = is_fresh && newest && isLeftOut(*newest, now);
+    if (!stands) moved_at_ = steadyTime();
+    const bool rests = stands && steadyTime() - moved_at_ > kStanding;
+    input_->setResting(rests);
+    if (!rests) return;
+    rests_ = true;
+    if (!input_->isPaused()) diagnostics_->input().noteIdle("the base stands, by " + options_.guess_frame_id);
+    if (now != std::exchange(corrected_at_, now)) publisher_->sendCorrection(now);
+  }
 
   /// Waits for the camera's mount on TF and for a guess by another odometry or the gyro. Without the lock, which
   /// services need.
@@ -224,8 +267,11 @@ class VisualOdometryNodelet : public RobotNodelet {
       const std::lock_guard<std::mutex> lock(work_mutex_);
       const bool is_trusted = !options_.guess_frame_id.empty() || !gyro_found_.isFault();
       if (is_trusted) guess.since = processed_stamp_;
+      guess.T_guess_since = T_guess_processed_;
     }
-    if (guess.since && mount_->last()) guess.motion = findGuess(*guess.since, header, isVoid);
+    if (guess.since && mount_->last()) guess.motion = findGuess(guess, header, isVoid);
+    if (std::string ignored; options_.awaitsMotion())
+      guess.T_guess_base = transforms_->find(options_.guess_frame_id, options_.base_frame_id, ignored, header.stamp);
     return guess;
   }
 
@@ -267,6 +313,7 @@ class VisualOdometryNodelet : public RobotNodelet {
                         << 1e-9 * static_cast<double>(passed_time) << " s after the pair before");
     time_shift_ += passed_time - step;
     processed_stamp_.reset();
+    T_guess_processed_.reset();
   }
 
   OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message, const Guess& guess) {
@@ -283,8 +330,10 @@ class VisualOdometryNodelet : public RobotNodelet {
     epoch_ = result.epoch;
     report(result, message.header.stamp);
     std::optional<Eigen::Isometry3d> T_guess_base;
-    if (std::string ignored; options_.correctsGuess())
+    if (std::string ignored; options_.correctsGuess() || options_.awaitsMotion())
       T_guess_base = transforms_->find(options_.guess_frame_id, options_.base_frame_id, ignored, message.header.stamp);
+    T_guess_processed_.reset();
+    if (options_.awaitsMotion() && result.state == TrackingState::kTracking) T_guess_processed_ = T_guess_base;
     publisher_->publish(result, *mount_->last(), T_guess_base);
     if (publisher_->wantsMap() && result.has_pose)
       publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
@@ -370,11 +419,12 @@ class VisualOdometryNodelet : public RobotNodelet {
     levels_until_.reset();
     processed_epoch_.reset();
     processed_stamp_.reset();
+    T_guess_processed_.reset();
   }
 
   /// The camera's motion since the previous pair by another odometry or the gyro; nothing if neither is enabled or has
   /// it.
-  std::optional<MotionGuess> findGuess(const ros::Time& since, const std_msgs::Header& header,
+  std::optional<MotionGuess> findGuess(const Guess& from, const std_msgs::Header& header,
                                        const std::function<bool()>& is_void) {
     const bool of_frame = !options_.guess_frame_id.empty();
     if (!of_frame && !(imu_ && imu_->hasRates())) return std::nullopt;
@@ -382,7 +432,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     std::optional<MotionGuess> guess;
     const double now = steadyTime(), give_up = now + patience_.timeout(now);
     for (;;) {
-      guess = of_frame ? guessOfFrame(since, header.stamp, problem) : guessOfGyro(since, header, problem);
+      guess = of_frame ? guessOfFrame(from, header.stamp, problem) : guessOfGyro(*from.since, header, problem);
       if (guess || steadyTime() >= give_up || is_void() || !ros::ok()) break;
       ros::WallDuration(0.002).sleep();
     }
@@ -396,9 +446,13 @@ class VisualOdometryNodelet : public RobotNodelet {
 
   static double steadyTime() { return ros::SteadyTime::now().toSec(); }
 
-  std::optional<MotionGuess> guessOfFrame(const ros::Time& since, const ros::Time& stamp, std::string& problem) const {
-    const std::optional<Eigen::Isometry3d> T_before_now =
-        transforms_->findMotion(options_.guess_frame_id, options_.base_frame_id, since, stamp, problem);
+  std::optional<MotionGuess> guessOfFrame(const Guess& from, const ros::Time& stamp, std::string& problem) const {
+    const std::string &fixed = options_.guess_frame_id, &base = options_.base_frame_id;
+    std::optional<Eigen::Isometry3d> T_before_now;
+    if (!from.T_guess_since)
+      T_before_now = transforms_->findMotion(fixed, base, *from.since, stamp, problem);
+    else if (const auto T_guess_base = transforms_->find(fixed, base, problem, stamp))  // TF does not go back for long
+      T_before_now = from.T_guess_since->inverse() * *T_guess_base;
     if (!T_before_now) return std::nullopt;
     const Eigen::Isometry3d T_base_camera = *mount_->last();
     return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera, false, options_.guess_error};
@@ -510,6 +564,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     return std::to_string(path.poses.size()) + " poses in '" + file + "'";
   }
 
+  static constexpr double kRestPeriod = 0.05;    // s of wall time, less than a pair takes
+  static constexpr double kStanding = 1.0;       // s until the images rest: subscribing anew costs a tenth (chosen)
   static constexpr double kOtherClock = 3600.0;  // s of latency, more than any slow machine has
   /// Queue of the subscriber (messages). The callback only stores them.
   static constexpr int kArrivalQueue = 20;
@@ -548,6 +604,11 @@ class VisualOdometryNodelet : public RobotNodelet {
   std::string camera_frame_;
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;
+  std::optional<Eigen::Isometry3d> T_guess_processed_;  // of the base, then, if the odometry tracked
+  double moved_at_ = steadyTime();                      // s: pairs were last wanted
+  bool rests_ = false;                                  // the input
+  ros::Time corrected_at_;                              // while it rests; TF takes a stamp once
+  ros::WallTimer rest_timer_;
   bool to_be_levelled_ = false;  // T_odom_start_ still needs the accelerometer
   bool latency_reported_ = false;
   bool base_is_camera_ = false;         // the base has optical axes, those of odom are REP-105's

@@ -63,7 +63,6 @@ void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isome
   extendPath(*odometry);
 }
 
-/// odom -> guess_frame_id stays without a pose: meanwhile the other odometry carries the base.
 void OdometryPublisher::sendCorrection(const ros::Time& stamp) {
   if (!options_.correctsGuess() || !T_odom_guess_) return;
   geometry_msgs::TransformStamped correction = tf2::eigenToTransform(*T_odom_guess_);

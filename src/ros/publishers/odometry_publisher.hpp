@@ -28,6 +28,8 @@ class OdometryPublisher {
   /// odometry of guess_frame_id, where it is known.
   void publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
                const std::optional<Eigen::Isometry3d>& T_guess_base = std::nullopt);
+  /// odom -> guess_frame_id as at the last pose, where TF gets it: meanwhile the other odometry carries the base.
+  void sendCorrection(const ros::Time& stamp);
   /// Fills in header, session and latency; returns what was published.
   stereo_descriptor_vo::VoInfo publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp);
   void publishFlow(const OdometryResult& result, const StereoFeatures& features, const std_msgs::Header& header);
@@ -57,7 +59,6 @@ class OdometryPublisher {
   static constexpr double kPathPeriod = 1.0;  // s of wall time
 
   void extendPath(const nav_msgs::Odometry& odometry);
-  void sendCorrection(const ros::Time& stamp);
 
   OdometryOutputOptions options_;
   ros_conversions::OdometryFrames frames_;
