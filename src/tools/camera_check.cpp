@@ -57,7 +57,7 @@ std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const
       {"same moment", rows_.sameMoment()},
       {"shutter", odometry_.shutter()},
       {"rectification", rows_.rectification()},
-      {"rig monitor", rig()},
+      {"refused pairs", rig()},
       {"lens", lens_check_.judge()},
       {"texture", images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share)},
       {"motion blur", images_.blur()},

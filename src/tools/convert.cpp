@@ -303,11 +303,14 @@ int convert(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Converts a recorded drive. To NAME.bag from a folder of KITTI, EuRoC or TUM-VI: images (raw ones stay raw) and "
-      "CameraInfo on /stereo/left|right/..., /tf_static and, where poses are known, /ground_truth/path and "
-      "/ground_truth/odom; stamps of KITTI are times.txt plus 1e9 s. To a folder in KITTI's layout from an EuRoC or "
-      "TUM-VI folder or a bag: rectified images, calib.txt, times.txt (seconds since the first stamp) and, where they "
-      "are known, poses.txt of the left camera");
+      "Converts a recorded drive.\n\n"
+      "convert FOLDER --output NAME.bag\n"
+      "  FOLDER of KITTI, EuRoC or TUM-VI. The bag has images (raw ones stay raw) and CameraInfo on\n"
+      "  /stereo/left|right/..., /tf_static and, where poses are known, /ground_truth/path and\n"
+      "  /ground_truth/odom. Stamps of KITTI are times.txt plus 1e9 s.\n\n"
+      "convert FOLDER_OR_BAG --output NEW_FOLDER\n"
+      "  FOLDER of EuRoC or TUM-VI. The new one has KITTI's layout: rectified images, calib.txt, times.txt\n"
+      "  (seconds since the first stamp) and, where they are known, poses.txt of the left camera.\n");
   Arguments arguments;
   app.add_option(
          "input", arguments.input,
