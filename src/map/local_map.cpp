@@ -177,17 +177,34 @@ void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int 
 
 void LocalMap::startPoint(const StereoFeatures& features, int feature, int id, const Eigen::Isometry3d& T_camera_origin,
                           const RigCalibration& calibration, double sigma) {
-  const StereoCamera& camera = features.camera;
-  const double u = features.u[feature], v = features.v[feature];
-  const double disparity =
-      std::max(features.disparity[feature] - calibration.disparityError(camera, u, v), kFarthestDisparity);
+  const Eigen::Vector3d measurement(features.u[feature], features.v[feature], features.disparity[feature]);
   Point& point = points_.emplace_back();
   point.position.T_origin_anchor = T_camera_origin.inverse();
-  point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
-                                          1.0 / camera.depth(disparity)};
-  point.reference.take(features, feature, {u, v}, T_camera_origin);
-  point.observations.push_back({{{u, v, features.disparity[feature]}, sigma}, id, feature});
+  point.placeAt(features.camera, measurement, calibration);
+  point.reference.take(features, feature, measurement.head<2>(), T_camera_origin);
+  point.observations.push_back({{measurement, sigma}, id, feature});
   takeDescriptor(point, features, feature);
+}
+
+/// Places a point where a pair saw it: (u_left, v_left, disparity), px.
+void LocalMap::Point::placeAt(const StereoCamera& camera, const Eigen::Vector3d& measurement,
+                              const RigCalibration& calibration) {
+  const double u = measurement.x(), v = measurement.y();
+  const double disparity = std::max(measurement.z() - calibration.disparityError(camera, u, v), kFarthestDisparity);
+  position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
+                                    1.0 / camera.depth(disparity)};
+}
+
+void LocalMap::moveNewest(const StereoFeatures& before, const StereoFeatures& now, const RigCalibration& calibration) {
+  const auto measured = [](const StereoFeatures& features, int i) {
+    return Eigen::Vector3d(features.u[i], features.v[i], features.disparity[i]);
+  };
+  for (Point& point : points_) {
+    FrameObservation& last = point.observations.back();
+    if (last.frame_id != newestId()) continue;
+    last.measurement += measured(now, last.feature) - measured(before, last.feature);
+    if (point.observations.size() == 1) point.placeAt(camera_, last.measurement, calibration);
+  }
 }
 
 bool LocalMap::needsKeyframe() const {

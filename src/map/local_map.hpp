@@ -85,6 +85,9 @@ class LocalMap {
               const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
               const RigCalibration& calibration);
 
+  /// Moves the newest pair's observations from its features as they were inserted to the same features elsewhere.
+  void moveNewest(const StereoFeatures& before, const StereoFeatures& now, const RigCalibration& calibration);
+
   /// The remembered key frame to whose place the newest pair has come back. Null if there is none, if the map still has
   /// it, or while another one is recalled.
   const OldKeyframe* revisited() const;
@@ -149,6 +152,8 @@ class LocalMap {
     int frame_id, feature;
   };
   struct Point {
+    void placeAt(const StereoCamera& camera, const Eigen::Vector3d& measurement, const RigCalibration& calibration);
+
     AnchoredPoint position;
     std::vector<FrameObservation> observations;  ///< in the order of the frames
     std::vector<std::uint8_t> descriptor;

@@ -52,7 +52,10 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
 }  // namespace
 
 OdometryState::OdometryState(const VisualOdometryOptions& options, int first_epoch)
-    : rig(unknownRig(options)), prior(options.tracking), epoch(first_epoch) {}
+    : rig(unknownRig(options)),
+      shutter(options.calibration.readout, options.tracking.rotation_acceleration),
+      prior(options.tracking),
+      epoch(first_epoch) {}
 
 void OdometryState::forgetRig(const VisualOdometryOptions& options) {
   rig = unknownRig(options);

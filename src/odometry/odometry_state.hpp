@@ -15,6 +15,7 @@
 #include "../map/local_map.hpp"
 #include "../rig/learnt_rig.hpp"
 #include "../rig/repeated_images.hpp"
+#include "../rig/rolling_shutter.hpp"
 #include "outage.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
@@ -64,7 +65,9 @@ struct OdometryState {
   std::optional<LocalMap> seed;
   bool seed_has_pose = false;  ///< the seed's pose is that of the guesses
   std::optional<LeftMap> left;
+  std::optional<RolledPair> newest;  ///< that joined the map or the seed; only with a rolling shutter
   LearntRig rig;
+  RollingShutter shutter;
   MotionPrior prior;
   Doubt doubt;
   Outage outage;

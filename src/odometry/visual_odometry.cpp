@@ -79,10 +79,14 @@ class VisualOdometry::Impl {
   using Step = OdometryStep;
 
   /// A pair as it is searched: in the map's camera, without repeated rows, with the right image rotated back and
-  /// synchronous.
+  /// synchronous, all rows of one moment.
   struct Pair {
     const StereoFeatures& given;
     std::optional<StereoFeatures> refocused{}, new_part{}, rotated_back{}, synchronised{};
+    std::optional<RolledPair> rolled{};      ///< only with a rolling shutter, as the next three
+    std::optional<StereoFeatures> global{};  ///< rows moved to the stamp
+    std::optional<RolledPair> newest{};      ///< of the map, with its velocity since the pair's motion is known
+    std::optional<LocalMap> map{};           ///< with this velocity
     std::vector<int> new_features{};
     double dt = 0.0;               ///< since the previous pair, s
     double frozen = kUnsuspected;  ///< log-odds that its images repeat although the camera moved
@@ -93,7 +97,8 @@ class VisualOdometry::Impl {
     const StereoFeatures& whole() const { return refocused ? *refocused : given; }
     const StereoFeatures& part() const { return new_part ? *new_part : whole(); }
     const StereoFeatures& taken() const { return rotated_back ? *rotated_back : part(); }
-    const StereoFeatures& features() const { return synchronised ? *synchronised : taken(); }
+    const StereoFeatures& inStep() const { return synchronised ? *synchronised : taken(); }
+    const StereoFeatures& features() const { return global ? *global : inStep(); }
   };
 
   /// The map with the pair, adjusted. The state does not change until commit().
@@ -111,6 +116,9 @@ class VisualOdometry::Impl {
   OdometryResult sound(OdometryResult result);
   Pair prepared(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
   void compensate(Pair& pair) const;
+  void roll(Pair& pair, const Vector6d& velocity) const;
+  bool rollAgain(Pair& pair, const MotionHypothesis& found) const;
+  void rememberRolled(Pair& pair, const MotionHypothesis& found, Step& step);
   void search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
               MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> expectedMotion(double dt, const std::optional<MotionGuess>& guess) const;
@@ -248,6 +256,7 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   state_.rig.learn(features, measured ? &*measured : nullptr, found, pair.rotation,
                    step.state == TrackingState::kTracking && scene);
   finish(pair, step);
+  rememberRolled(pair, found, step);
   step.time = stopwatch.lap();
   return sound(state_.report(features, pair.new_features, found, step, floor()));
 }
@@ -308,8 +317,70 @@ void VisualOdometry::Impl::compensate(Pair& pair) const {
   pair.rotated_back.reset();
   if (!rotation.isZero()) pair.rotated_back = rotatedBack(pair.part(), rotation);
   const bool has_map = pair.is == Pair::kFollowed || pair.is == Pair::kSought;
-  if (has_map && state_.prior.velocity() && pair.dt <= options_.tracking.max_gap)
-    pair.synchronised = synchronised(pair.taken(), pair.dt, *state_.prior.velocity());
+  const bool is_predicted = has_map && state_.prior.velocity() && pair.dt <= options_.tracking.max_gap;
+  if (is_predicted) pair.synchronised = synchronised(pair.taken(), pair.dt, *state_.prior.velocity());
+  roll(pair, is_predicted ? *state_.prior.velocity() : Vector6d::Zero());
+}
+
+/// Moves all rows to the stamp, by the velocity of the camera there.
+void VisualOdometry::Impl::roll(Pair& pair, const Vector6d& velocity) const {
+  if (!state_.shutter.isRolling()) return;
+  pair.rolled = RolledPair{pair.inStep(), velocity};
+  pair.global = state_.shutter.asGlobal(*pair.rolled);
+}
+
+/// Moves rows of the pair, and of the map's newest one, by the velocities that the pair's motion implies. False if they
+/// are moved so already.
+bool VisualOdometry::Impl::rollAgain(Pair& pair, const MotionHypothesis& found) const {
+  const RollingShutter& shutter = state_.shutter;
+  const auto changes = [&](RolledPair& rolled, const Vector6d& velocity) {
+    if (shutter.isNegligible(rolled.features.camera, velocity - rolled.velocity)) return false;
+    rolled.velocity = velocity;
+    return true;
+  };
+  RolledPair& now = *pair.rolled;
+  now.forgetMotion();
+  now.rate_by_rows = shutter.rateByRows(now, found);
+  bool has_changed = false;
+  if (pair.is == Pair::kFollowed) {
+    const Eigen::Isometry3d motion = found.motion.T_current_reference.inverse();
+    now.dt = state_.prior.interval(state_.map->secondsUntil(now.features), motion);
+    now.mean = logSE3(motion) / now.dt;
+    if (state_.newest && state_.newest->features.stamp == state_.map->newestStamp()) {
+      const RolledPair& newest = *state_.newest;
+      now.mean_before = newest.mean;
+      if (!pair.newest) pair.newest = newest;
+      if (changes(*pair.newest, shutter.velocityBetween(newest, *now.mean))) {
+        has_changed = true;
+        pair.map = state_.map;
+        pair.map->moveNewest(shutter.asGlobal(newest), shutter.asGlobal(*pair.newest),
+                             state_.rig.calibration.calibration());
+      }
+    }
+  }
+  if (changes(now, shutter.velocityAt(now))) {
+    has_changed = true;
+    pair.global = shutter.asGlobal(now);
+  }
+  return has_changed;
+}
+
+/// Widens covariances by the error of the pair's velocity, and keeps the pair until the next motion is known.
+void VisualOdometry::Impl::rememberRolled(Pair& pair, const MotionHypothesis& found, Step& step) {
+  const auto ends_with_it = [&](const std::optional<LocalMap>& map) {
+    return map && map->newestStamp() == pair.given.stamp;
+  };
+  if (!pair.rolled || (!ends_with_it(state_.map) && !ends_with_it(state_.seed))) return;
+  RolledPair& rolled = *pair.rolled;
+  if (!found.motion.success || !step.T_previous_current) {
+    rolled.forgetMotion();
+  } else {
+    const Matrix6d moment = state_.shutter.momentOf(rolled);
+    step.covariance += moment;
+    state_.covariance.doubt(moment, moment);
+  }
+  if (state_.newest && rolled.mean) state_.shutter.learn(*state_.newest, *rolled.mean);
+  state_.newest = std::move(pair.rolled);
 }
 
 /// Searches the pair's motion in the map, after an outage also in the seed. If the camera turns otherwise than
@@ -319,7 +390,8 @@ void VisualOdometry::Impl::search(Pair& pair, const std::optional<MotionGuess>& 
                                   std::optional<MotionScene>& scene, MotionHypothesis& found) const {
   const auto find = [&] {
     scene.reset();
-    if (pair.is == Pair::kFollowed) scene.emplace(sceneOf(*state_.map, pair.features(), pair.dt, guess));
+    if (pair.is == Pair::kFollowed)
+      scene.emplace(sceneOf(pair.map ? *pair.map : *state_.map, pair.features(), pair.dt, guess));
     if (pair.is == Pair::kSought)
       if (auto place = reacquire(pair.features())) scene.emplace(std::move(*place));
     found = scene ? search_.find(*scene, largestDoubt()) : MotionHypothesis();
@@ -335,10 +407,18 @@ void VisualOdometry::Impl::search(Pair& pair, const std::optional<MotionGuess>& 
     const double unexpected = (velocity - *state_.prior.velocity()).tail<3>().norm();
     if (std::abs(delay) * pair.given.camera.fx * unexpected < kNegligible) return velocity;
     pair.synchronised = synchronised(pair.taken(), pair.dt, velocity);
+    roll(pair, velocity);
     return find();
   };
+  const auto findGlobal = [&] {
+    constexpr int kPasses = 3;  // at most; each leaves some hundredths of the velocity's error
+    Vector6d velocity = findSynchronised();
+    for (int pass = 0; pass < kPasses && pair.rolled && found.motion.success && rollAgain(pair, found); ++pass)
+      velocity = find();
+    return velocity;
+  };
   const auto shownBeyond = [&](const Eigen::Vector3d& supposed) {
-    const Vector6d velocity = findSynchronised();
+    const Vector6d velocity = findGlobal();
     const Eigen::Vector3d turn = pair.dt * velocity.tail<3>();
     const Eigen::Vector3d before = pair.dt * state_.prior.velocity().value_or(Vector6d::Zero()).tail<3>();
     const Eigen::Matrix3d turns = turn * turn.transpose() + before * before.transpose();
@@ -354,11 +434,11 @@ void VisualOdometry::Impl::search(Pair& pair, const std::optional<MotionGuess>& 
     compensateFor({yaw, Eigen::Matrix3d::Zero(), kCertain, kUnsuspected});
     pair.rotation = shownBeyond(yaw);
     if (!found.motion.success || found.agreement.inliers <= inliers || !(pair.rotation.log_odds > 0.0))
-      compensateFor(at_first), findSynchronised();
+      compensateFor(at_first), findGlobal();
   }
   if (!(pair.rotation.log_odds > 0.0)) return;
   compensate(pair);
-  findSynchronised();
+  findGlobal();
 }
 
 /// Expected motion over the `dt` s since the previous pair: the guess, else the prediction.

@@ -13,7 +13,8 @@ CameraCheck::CameraCheck(const PipelineOptions& options, const OfflineRun& run)
     : options_(options),
       run_(run),
       rows_(options.stereo_features.stereo.max_epipolar_residual, options.stereo_features.stereo.epipolar.max_disparity,
-            RigMonitor::kReach) {}
+            RigMonitor::kReach),
+      odometry_(options.visual_odometry.calibration.readout) {}
 
 void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) {
   camera_ = pair.camera;

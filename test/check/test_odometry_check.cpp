@@ -28,4 +28,9 @@ TEST(OdometryCheck, NamesTheStatesAndTheReasonThatIsMostFrequent) {
   EXPECT_EQ(OdometryCheck().judge().verdict, Verdict::kOpen);
 }
 
+TEST(OdometryCheck, ACompensatedReadoutIsNoFault) {
+  EXPECT_EQ(OdometryCheck().shutter().verdict, Verdict::kOpen);
+  EXPECT_EQ(OdometryCheck(0.0256).shutter().text(), "a readout of 25.6 ms is compensated");
+}
+
 }  // namespace sdvo::test_odometry_check

@@ -313,6 +313,26 @@ TEST(LocalMap, IsContinuedByTheSameCameraAndKindOfDescriptor) {
   EXPECT_TRUE(map.continuedBy(synthetic::noFeatures(synthetic::camera(), 0, 64))) << "no features, no other kind";
 }
 
+TEST(LocalMap, MovesTheNewestPairToWhereItsFeaturesAreNow) {
+  const synthetic::World world = someWorld(20);
+  const Eigen::Isometry3d second = translated(0.1, 0.0, -0.4), moved = translated(0.12, 0.03, -0.45);
+  LocalMap map(everyPairAKeyframe()), expected(everyPairAKeyframe());
+  for (LocalMap* each : {&map, &expected}) add(*each, see(world, 0, 10, kOrigin), 1, kOrigin, {});
+  // Ten points are seen again, ten are new.
+  const StereoFeatures before = see(world, 0, 20, second), now = see(world, 0, 20, moved);
+  add(map, before, 2, second, recognised(map, before, 10));
+  add(expected, now, 2, second, recognised(expected, now, 10));
+  map.moveNewest(before, now, RigCalibration());
+  const std::vector<Eigen::Vector3d> positions = map.positions(), all = expected.positions();
+  ASSERT_EQ(positions.size(), all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) EXPECT_LT((positions[i] - all[i]).norm(), 1e-6 * all[i].norm());
+  WindowOptimizer optimizer{WindowOptimizerOptions()};
+  RigCalibration calibration;
+  for (LocalMap* each : {&map, &expected}) ASSERT_TRUE(each->adjust(optimizer, {}, calibration).success);
+  EXPECT_TRUE(map.newestPose().isApprox(expected.newestPose(), 1e-6));
+  EXPECT_FALSE(map.newestPose().isApprox(second, 1e-3));
+}
+
 TEST(LocalMap, ViewIsWhatTheNewestPairSees) {
   const synthetic::World world = someWorld(20);
   LocalMap map({});

@@ -1191,6 +1191,59 @@ TEST(VisualOdometry, TakesOtherOptionsOverWhileRunning) {
   EXPECT_EQ(odometry.update(pairOf(8)).state, TrackingState::kLost) << "never so many features";
 }
 
+/// Pair i of a camera that turns and shakes while its rows are taken within `readout` s, the middle one at the stamp.
+StereoFeatures rolledPair(int i, double readout) {
+  const auto poseAt = [](double time) {
+    Vector6d motion;
+    motion << 0.3 * std::sin(2.0 * time), 0.1 * std::sin(9.0 * time), 0.8 * time, 0.03 * std::sin(11.0 * time),
+        0.4 * std::sin(1.5 * time), 0.02 * std::sin(13.0 * time);
+    return expSE3(motion);
+  };
+  constexpr double kSeconds = 0.05;  // between pairs
+  const StereoCamera camera = synthetic::camera();
+  const synthetic::World& world = street();
+  StereoFeatures features = synthetic::noFeatures(camera, stampOf(0) + static_cast<std::int64_t>(1e9 * kSeconds * i));
+  for (std::size_t k = 0; k < world.points.size(); ++k) {
+    double time = kSeconds * i;
+    Eigen::Vector3d point;
+    for (int iteration = 0; iteration < 10; ++iteration) {
+      point = poseAt(time).inverse() * world.points[k];
+      if (point.z() < 2.0) break;
+      time = kSeconds * i + readout * ((camera.project(point).y() + 0.5) / camera.height - 0.5);
+    }
+    if (point.z() < 2.0 || point.z() > 25.0) continue;
+    const Eigen::Vector3d pixel = camera.project(point);
+    if (camera.sees(pixel) && pixel.z() > 0.0)
+      synthetic::addFeature(features, pixel.x(), pixel.y(), pixel.x() - pixel.z(), world.rows[k]);
+  }
+  return features;
+}
+
+TEST(VisualOdometry, ARollingShutterOfKnownReadoutIsAsGoodAsAGlobalOne) {
+  constexpr double kReadout = 0.025;
+  const auto positions = [](double taken, double known) {
+    VisualOdometryOptions options;
+    options.calibration.readout = known;
+    VisualOdometry odometry(options);
+    std::vector<Eigen::Vector3d> positions;
+    for (int i = 0; i < 40; ++i) {
+      const OdometryResult result = odometry.update(rolledPair(i, taken));
+      EXPECT_TRUE(result.has_pose) << i << ": " << result.reason;
+      positions.push_back(result.T_origin_camera.translation());
+    }
+    return positions;
+  };
+  const auto largest = [truth = positions(0.0, 0.0)](const std::vector<Eigen::Vector3d>& estimate) {
+    double error = 0.0;
+    for (std::size_t i = 0; i < truth.size(); ++i) error = std::max(error, (estimate[i] - truth[i]).norm());
+    return error;
+  };
+  const double unknown = largest(positions(kReadout, 0.0)), known = largest(positions(kReadout, kReadout));
+  EXPECT_LT(largest(positions(-kReadout, -kReadout)), 0.2 * unknown) << "read upwards";
+  EXPECT_LT(known, 0.2 * unknown);
+  EXPECT_LT(known, 0.02) << "m, of 1.6 m";
+}
+
 TEST(VisualOdometry, NamesTheMapsLastKeyframe) {
   Drive drive;
   // At this speed every pair is one; a lost odometry has none.

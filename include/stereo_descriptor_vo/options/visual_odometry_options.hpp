@@ -124,6 +124,7 @@ struct CalibrationOptions {
   double right_roll_sigma = 0.001;  ///< rad, chosen: 0.2 px at the upper edge of KITTI's images
   double right_delay = 0.0;
   double right_delay_sigma = 0.003;  ///< s, chosen: 0.2 ms with a common trigger (twelve drives), half a frame without
+  double readout = 0.0;
 
   void describe(OptionList& list) {
     list.add("enabled", enabled, "estimate the rig's residual disparity error while driving and compensate it");
@@ -135,6 +136,9 @@ struct CalibrationOptions {
              "likely as none");
     list.add("right_delay", right_delay, {-0.1, 0.1}, "s",
              "time by which right images are known to be later than left ones; what it lacks is estimated");
+    list.add("readout", readout, {-0.1, 0.1}, "s",
+             "rolling shutters: the last row is taken so much later than the first (negative: earlier), the middle one "
+             "at the stamp");
   }
 };
 
