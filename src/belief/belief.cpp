@@ -7,7 +7,7 @@
 namespace sdvo {
 namespace {
 
-/// Number of matched features, and the mean of their positions.
+/// Words on where a motion is in the image: the number of its features, and the mean of their positions.
 std::string placeWords(const StereoFeatures& features, const std::vector<int>& matched) {
   double u = 0.0, v = 0.0;
   for (const int i : matched) u += features.u[i], v += features.v[i];

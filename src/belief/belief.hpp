@@ -14,7 +14,9 @@ namespace sdvo {
 struct Evidence {
   /// Log-odds that it did (`any`), bounded by those of certainty: nothing is more certain than the model behind it.
   Evidence(double any, std::string named, bool may_last = false)
-      : log_odds(any > kUnsuspected ? std::min(any, kCertain) : kUnsuspected), cause(std::move(named)), lasts(may_last) {}
+      : log_odds(any > kUnsuspected ? std::min(any, kCertain) : kUnsuspected),
+        cause(std::move(named)),
+        lasts(may_last) {}
 
   double log_odds;
   std::string cause;

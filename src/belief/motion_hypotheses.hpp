@@ -89,7 +89,7 @@ struct MotionHypothesis {
   int sightingsOf(int match) const;
   bool isLasting(int match) const { return sightingsOf(match) >= kLastingSightings; }
 
-  /// Whether there is a motion, and most matches agree with it.
+  /// Whether a motion was found and most matches agree with it.
   bool isOfMajority() const { return motion.success && 2 * agreement.inliers > agreement.matches; }
 
   /// Features of the pair that the inliers matched, without the rejected ones.

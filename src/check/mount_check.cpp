@@ -36,8 +36,9 @@ void MountCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isomet
 }
 
 Finding MountCheck::judge(double tilt_sigma) const {
-  // Chosen: m; standard deviations of the estimate, and of the mount beforehand.
-  constexpr double kEnough = 1.0, kProved = 5.0, kRelevant = 2.0;
+  constexpr double kEnough = 1.0;    // m of way (chosen)
+  constexpr double kProved = 5.0;    // standard deviations of the estimated tilt (chosen)
+  constexpr double kRelevant = 2.0;  // standard deviations by which the mount on TF is trusted (chosen)
   constexpr double kDegree = M_PI / 180.0, kUnknown = 1e6, kMost = 25.0;  // rad; deg: more is another axis
   if (distance_ < kEnough) return {Verdict::kOpen, "too short a way", "drive two metres, with a turn"};
   const double sigma = tilt_sigma * kDegree;
@@ -61,7 +62,7 @@ Finding MountCheck::judge(double tilt_sigma) const {
   const bool is_wrong = isWrong(0) || isWrong(1);
   std::string what;
   for (const auto& [axis, how, sign] : {std::tuple(0, "pitched down by ", -1.0), std::tuple(1, "rolled by ", 1.0)}) {
-    // Without turns, a straight way shows the tilt along it alone.
+    // A way without turns shows the tilt along it, but not the one across it.
     const bool is_known = isWrong(axis) || deviation(axis) < kRelevant * sigma;
     if (!is_known) tilt[axis] = 0.0;
     if (is_known)

@@ -13,7 +13,7 @@ namespace sdvo {
 /// Statistics of the odometry: states, inliers, rotation from pair to pair.
 class OdometryCheck {
  public:
-  /// `readout`, s: of a rolling shutter that the odometry compensates.
+  /// `readout`: time from the first row to the last, s, that the odometry compensates; 0 if none.
   explicit OdometryCheck(double readout = 0.0) : compensated_(readout) {}
 
   void add(const StereoFeatures& features, const OdometryResult& result);

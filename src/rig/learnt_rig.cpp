@@ -50,7 +50,7 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   ShownRotation shown;
   if (features.count() < kFewestMeasured) return shown;
   std::optional<RightRotation> by_disparities;
-  // A minority's motion may be a mover's.
+  // A minority's motion may be a mover's. With a supposed rotation, more matches and the rows have to confirm it.
   if (found.isOfMajority() || (found.motion.success && !supposed.isZero())) {
     NoiseOptions scaled = assumed_;
     scaled.corner *= noise.scale();

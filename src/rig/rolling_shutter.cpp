@@ -45,7 +45,7 @@ bool RollingShutter::isNegligible(const StereoCamera& camera, const Vector6d& di
 std::optional<RateByRows> RollingShutter::rateByRows(const RolledPair& pair, const MotionHypothesis& found) const {
   using Matrix = Eigen::Matrix<double, 9, 9>;
   using Vector = Eigen::Matrix<double, 9, 1>;
-  constexpr int kReweightings = 3;
+  constexpr int kReweightings = 3;  // passes (chosen), each with the weights of the one before
   const StereoCamera& camera = pair.features.camera;
   const Eigen::Isometry3d& T = found.motion.T_current_reference;
   Vector error = Vector::Zero();

@@ -585,6 +585,60 @@ class Live(PipelineCase):
         T_odom_base = matrix_of(corrections()[-1].transform) @ matrix_of(transform.transform)
         np.testing.assert_allclose(T_odom_base[:3, 3], [now.x, now.y, self.odometry[3].pose.pose.position.z], atol=1.0)
 
+    def test_nothing_works_while_the_wheels_stand(self):
+        self.clock.jump_to(rospy.Time.from_sec(EPOCH))  # tests before carried it on, and a guess must not be old
+        self.start(config=self.config('visual_odometry: {guess_frame_id: wheels, guess_timeout: 0.5, guess_min_translation: 0.1}\n'))
+        all_tf = self.keep(Collector('/tf', TFMessage))
+        tf = self.keep(tf2_ros.TransformBroadcaster())
+        tf.close = tf.pub_tf.unregister
+        self.until(lambda: self.is_sent_to_pipeline(tf.pub_tf) and ('out', '/tf', rospy.get_name()) in links(self.pipeline.manager))
+        driven, times = [0.0], itertools.count()
+
+        def images(i, step=0.0):
+            """Pair i at the next stamp, and where the wheels are by then."""
+            messages = self.camera.messages(i, time_of=next(times))
+            driven[0] += step
+            transform = TransformStamped()
+            transform.header.frame_id, transform.child_frame_id, transform.header.stamp = 'wheels', 'base_link', messages[0][0].header.stamp
+            transform.transform.translation.x, transform.transform.rotation.w = driven[0], 1.0
+            tf.sendTransform(transform)
+            return messages
+
+        def cpu():
+            with open('/proc/%d/stat' % self.pid) as file:
+                return sum(int(word) for word in file.read().rsplit(')')[1].split()[11:13]) / os.sysconf('SC_CLK_TCK')
+        for i in range(4):
+            info = self.feed_messages(*images(i, 1.0))
+            self.assertEqual(info.state, 'TRACKING')
+        self.features.close()  # the only other listener
+        self.closeables.remove(self.features)
+
+        def rests():
+            self.camera.publish(*images(3))
+            time.sleep(0.1)
+            return not self.camera.has_subscribers()
+        self.until(rests)
+        answers, begin, used = len(self.info), time.monotonic(), cpu()
+        for _ in range(200):  # longer than TF remembers
+            self.camera.publish(*images(3))
+            time.sleep(0.02)
+        self.assertLess((cpu() - used) / (time.monotonic() - begin), 0.05)  # of a processor
+        self.assertEqual(len(self.info), answers)
+        self.until(lambda: 'the base stands, by wheels' in self.diagnosis('input rate').message)
+        corrections = [t for m in list(all_tf) for t in m.transforms if (t.header.frame_id, t.child_frame_id) == ('odom', 'wheels')]
+        self.assertGreater(corrections[-1].header.stamp, info.header.stamp + rospy.Duration(10))
+
+        # Off it goes: the map is where it was.
+        self.until(lambda: images(4, 1.0) and self.camera.is_subscribed())
+        before = self.odometry[-1].pose.pose.position
+        driven[0] = 5.0
+        messages = images(4)
+        self.camera.publish(*messages)
+        self.until(lambda: self.odometry.has(messages[0][0].header.stamp) and len(self.info) > answers)
+        self.assertEqual((self.info[-1].state, self.info[-1].epoch), ('TRACKING', 0), self.info[-1].reason)
+        after = self.odometry[-1].pose.pose.position
+        self.assertAlmostEqual(np.hypot(after.x - before.x, after.y - before.y), 1.0, delta=0.1)
+
     def test_a_gyro_is_asked_for_the_rotation(self):
         self.start(config=self.config('visual_odometry: {use_imu: true, guess_timeout: 1.0}\n'))
         imu = self.publisher('imu', Imu)
