@@ -64,26 +64,64 @@ struct WeightedJacobians {
       by_point[2][k] = -d * moved[2];
     }
     by_point[2][2] += c;
+    for (auto& column : by_pose) column[6] = column[0], column[7] = column[1];
   }
 };
 
-/// block += sign a b^T for blocks of six columns, each with kRows rows, which lie in memory one after the other.
-template <int kRows, int kTerms, int kSign>
+/// block += sign a b^T for blocks of six columns, each with kLanes rows, which lie in memory one after the other.
+template <int kTerms, int kSign>
 SDVO_IN_KERNEL void addProduct(const double* a, const double* b, double* block) {
-  for (int row = 0; row < kRows; row += kLanes) {
-    DoubleLanes of_a[kTerms];
-    for (int m = 0; m < kTerms; ++m) load(a + kRows * m + row, of_a[m]);
-    for (int k = 0; k < 6; ++k) {
-      DoubleLanes sum;
-      load(block + kRows * k + row, sum);
-      for (int m = 0; m < kTerms; ++m) {
-        const DoubleLanes product = of_a[m] * b[kFactorRows * m + k];
-        sum = kSign > 0 ? sum + product : sum - product;
-      }
-      store(sum, block + kRows * k + row);
+  DoubleLanes of_a[kTerms];
+  for (int m = 0; m < kTerms; ++m) load(a + kLanes * m, of_a[m]);
+  for (int k = 0; k < 6; ++k) {
+    DoubleLanes sum;
+    load(block + kLanes * k, sum);
+    for (int m = 0; m < kTerms; ++m) {
+      const DoubleLanes product = of_a[m] * b[kFactorRows * m + k];
+      sum = kSign > 0 ? sum + product : sum - product;
     }
+    store(sum, block + kLanes * k);
   }
 }
+
+/// Three columns of a pose, each number in as many lanes as a product of 6x6 takes it: two columns of the product fill
+/// three registers.
+class SpreadColumns {
+ public:
+  SDVO_IN_KERNEL explicit SpreadColumns(const double* columns) {
+    const auto is_first = DoubleLanes{0.0, 0.0, 1.0, 1.0} < 0.5;
+#pragma GCC unroll 3
+    for (int m = 0; m < 3; ++m)
+#pragma GCC unroll 3
+      for (int k = 0; k < 3; ++k) {
+        const double a = columns[kFactorRows * m + 2 * k], b = columns[kFactorRows * m + 2 * k + 1];
+        const DoubleLanes first = {a, a, a, a}, second = {b, b, b, b};
+        values_[m][k][0] = first, values_[m][k][1] = is_first ? first : second, values_[m][k][2] = second;
+      }
+  }
+
+  /// block += sign a b^T, where b are these columns and block is 6x6, column by column.
+  template <int kSign>
+  SDVO_IN_KERNEL void addProduct(const double* a, double* block) const {
+    constexpr int kRowOf[] = {0, 4, 2};  // at which a register begins; the first two rows follow the last one
+    DoubleLanes of_a[3][3];
+    for (int m = 0; m < 3; ++m)
+      for (int i = 0; i < 3; ++i) load(a + kFactorRows * m + kRowOf[i], of_a[m][i]);
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < 3; ++i, block += kLanes) {
+        DoubleLanes sum;
+        load(block, sum);
+        for (int m = 0; m < 3; ++m) {
+          const DoubleLanes product = of_a[m][i] * values_[m][k][i];
+          sum = kSign > 0 ? sum + product : sum - product;
+        }
+        store(sum, block);
+      }
+  }
+
+ private:
+  DoubleLanes values_[3][3][3];
+};
 
 /// Columns of kFactorRows numbers times a 3x3 matrix that is given row by row.
 SDVO_IN_KERNEL void multiply(const double* columns, const double (&matrix)[3][kLanes], double* products) {
@@ -107,8 +145,8 @@ SDVO_IN_KERNEL void addTimes(const double* columns, const double* vector, double
   }
 }
 
-/// Inverse of the Cholesky factor of a matrix, of which the lower triangle is given. Squares on its diagonal are at least
-/// `least`, because rounding may make them negative.
+/// Inverse of the Cholesky factor of a matrix, of which the lower triangle is given. Squares on its diagonal are at
+/// least `least`, because rounding may make them negative.
 SDVO_IN_KERNEL void invertRoot(const double (&H)[3][kLanes], const double (&least)[3], double (&R)[3][3]) {
   R[0][1] = R[0][2] = R[1][2] = 0.0;
   R[0][0] = 1.0 / std::sqrt(std::max(H[0][0], least[0]));
@@ -120,6 +158,29 @@ SDVO_IN_KERNEL void invertRoot(const double (&H)[3][kLanes], const double (&leas
   R[2][1] = -l21 * R[1][1] * R[2][2];
   R[2][0] = -(l20 * R[0][0] + l21 * R[1][0]) * R[2][2];
 }
+
+/// sumGradients(), with `by` filled up to kFactorRows.
+struct SumGradients {
+  static SDVO_IN_KERNEL void run(const EliminatedPoint* points, std::size_t count, const PoseFactor* factor,
+                                 const double* by, const double* by_calibration, FactorColumn* sums) {
+    for (std::size_t p = 0; p < count; ++p) {
+      DoubleLanes low{}, high{};
+      add<kCalibration>(by_calibration, points[p].calibration_gradient.data(), low, high);
+      for (const PoseFactor* end = factor + points[p].factors; factor != end; ++factor)
+        add<6>(by + 6 * kFactorRows * factor->pose, factor->gradient.data(), low, high);
+      store(low, sums[p].data()), store(high, sums[p].data() + kLanes);
+    }
+  }
+
+  template <int kColumns>
+  static SDVO_IN_KERNEL void add(const double* columns, const double* vector, DoubleLanes& low, DoubleLanes& high) {
+    for (int k = 0; k < kColumns; ++k, columns += kFactorRows) {
+      DoubleLanes first, second;
+      load(columns, first), load(columns + kLanes, second);
+      low += first * vector[k], high += second * vector[k];
+    }
+  }
+};
 
 }  // namespace
 
@@ -164,8 +225,8 @@ struct AddPoint {
       multiply(J.by_pose[0], J.by_point, factor.Y.data());
       factor.gradient.setZero();
       addTimes<1>(J.by_pose[0], residual, factor.gradient.data());
-      addProduct<kFactorRows, 3, 1>(J.by_pose[0], J.by_pose[0], equations->ofPoses(factor.pose, factor.pose));
-      addProduct<kLanes, 1, 1>(shape, J.by_pose[2], equations->of_both_[factor.pose].values);
+      SpreadColumns(J.by_pose[0]).addProduct<1>(J.by_pose[0], equations->ofPoses(factor.pose, factor.pose));
+      addProduct<1, 1>(shape, J.by_pose[2], equations->of_both_[factor.pose].values);
     }
     double H[3][kLanes], g[kLanes], by_calibration[3][kLanes], of_calibration[kLanes], disparity_by_point[kLanes];
     double calibration[3][kLanes];
@@ -201,11 +262,13 @@ struct AddPoint {
       double* Y = factor.Y.data();
       multiply(Y, transposed, Y);
       addTimes<-1>(Y, reduced, factor.gradient.data());
-      for (int other = 0; other <= k; ++other)
-        addProduct<kFactorRows, 3, -1>(Y, factors[other].Y.data(),
-                                       equations->ofPoses(factor.pose, factors[other].pose));
-      addProduct<kLanes, 3, -1>(reduced_calibration[0], Y, equations->of_both_[factor.pose].values);
+      addProduct<3, -1>(reduced_calibration[0], Y, equations->of_both_[factor.pose].values);
       for (int i = 0; i < 6; ++i) equations->gradient_[6 * factor.pose + i] += factor.gradient[i];
+    }
+    for (int other = 0; other < count; ++other) {
+      const SpreadColumns columns(factors[other].Y.data());
+      for (int k = other; k < count; ++k)
+        columns.addProduct<-1>(factors[k].Y.data(), equations->ofPoses(factors[k].pose, factors[other].pose));
     }
 
     *result = {};
@@ -236,6 +299,15 @@ void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<Po
   }
 }
 
+void sumGradients(const std::vector<EliminatedPoint>& points, const std::vector<PoseFactor>& factors,
+                  const Eigen::Matrix<double, 6, Eigen::Dynamic>& by, std::vector<FactorColumn>& sums) {
+  Eigen::Matrix<double, kFactorRows, Eigen::Dynamic> filled =
+      Eigen::Matrix<double, kFactorRows, Eigen::Dynamic>::Zero(kFactorRows, by.cols());
+  filled.topRows<6>() = by;
+  runKernel<SumGradients>(points.data(), points.size(), factors.data(), filled.data(),
+                          filled.rightCols<kCalibration>().data(), sums.data());
+}
+
 void PoseEquations::setZero(int poses) {
   of_poses_.assign(static_cast<std::size_t>(poses * (poses + 1) / 2), {});
   of_both_.assign(static_cast<std::size_t>(poses), {});
@@ -256,8 +328,7 @@ void PoseEquations::writeHessian(Eigen::MatrixXd& hessian) const {
   const PoseBlock* block = of_poses_.data();
   for (Eigen::Index row = 0; row < poses; ++row)
     for (Eigen::Index column = 0; column <= row; ++column, ++block)
-      hessian.block<6, 6>(6 * row, 6 * column) =
-          Eigen::Map<const Eigen::Matrix<double, kFactorRows, 6>>(block->values).topRows<6>();
+      hessian.block<6, 6>(6 * row, 6 * column) = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(block->values);
   for (Eigen::Index pose = 0; pose < poses; ++pose)
     hessian.block<kCalibration, 6>(6 * poses, 6 * pose) =
         Eigen::Map<const Eigen::Matrix<double, 4, 6>>(of_both_[static_cast<std::size_t>(pose)].values)

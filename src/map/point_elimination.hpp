@@ -33,14 +33,15 @@ constexpr double kBehindSquare = 1e4;
 /// Squares of the observations' normalised residuals; kBehindSquare where the point is not in front of the camera.
 void squareResiduals(const WindowProjection& projection, const ObservedPoint& point, double* squares);
 
-/// Rows of a factor: six, and two of zeros, so that they fill registers.
+/// Rows of a factor: six, and the first two again, so that they fill registers.
 constexpr int kFactorRows = 8;
+using FactorColumn = Eigen::Matrix<double, kFactorRows, 1>;
 
 /// An observation's entries in the normal equations, by its pose (left perturbation: m, rad).
 struct PoseFactor {
   Eigen::Matrix<double, kFactorRows, 3> Y;  ///< J_pose^T W J_point R^T: products of these are the Schur complement
-  Eigen::Matrix<double, kFactorRows, 1> gradient;  ///< its share of the reduced gradient
-  int pose;                                        ///< among the poses that may move, from zero on
+  FactorColumn gradient;                    ///< its share of the reduced gradient
+  int pose;                                 ///< among the poses that may move, from zero on
 };
 
 /// A point's 3x3 normal equations H x = g, factored as H = L L^T with R = L^-1. `by_calibration` is the block of the
@@ -71,6 +72,10 @@ void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<Po
                 const Eigen::VectorXd& pose_steps, const RigCalibration::Vector& calibration_step,
                 std::vector<Eigen::Vector3d>& ray_and_inverse_depth);
 
+/// For each point: `by` times its share of the reduced gradient, in the first six rows.
+void sumGradients(const std::vector<EliminatedPoint>& points, const std::vector<PoseFactor>& factors,
+                  const Eigen::Matrix<double, 6, Eigen::Dynamic>& by, std::vector<FactorColumn>& sums);
+
 /// Reduced normal equations of all poses of a window but the first, and of the rig's calibration.
 class PoseEquations {
  public:
@@ -88,9 +93,9 @@ class PoseEquations {
 
  private:
   friend struct AddPoint;
-  /// Column by column, contiguous. Rows beyond the sixth, or beyond the calibration's, are not used.
+  /// Column by column, contiguous. Rows beyond the calibration's are not used.
   struct PoseBlock {
-    double values[6 * kFactorRows];
+    double values[6 * 6];
   };
   struct CalibrationBlock {
     double values[6 * 4];

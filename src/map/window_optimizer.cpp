@@ -275,14 +275,10 @@ class WindowOptimizer::Solver {
     clusters_.clear();
     const double scale = window_->camera.fx / kPart;
     const auto index = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kSide / 2), 0, kSide - 1); };
-    const PoseFactor* observation = factors_.data();
-    for (std::size_t p = 0; p < points_.size(); ++p) {
-      const EliminatedPoint& point = points_[p];
-      Vector6d moved = by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
-      for (const PoseFactor* end = observation + point.factors; observation != end; ++observation)
-        moved += by.middleCols<6>(6 * observation->pose).lazyProduct(observation->gradient.head<6>());
-      clusters_.push_back({index(estimate_.points[p].x()), index(estimate_.points[p].y()), moved});
-    }
+    gradients_.resize(points_.size());
+    sumGradients(points_, factors_, by, gradients_);
+    for (std::size_t p = 0; p < points_.size(); ++p)
+      clusters_.push_back({index(estimate_.points[p].x()), index(estimate_.points[p].y()), gradients_[p].head<6>()});
     double most = 0.0;
     for (int side = kSide; side >= kSide / 4; side /= 2) {
       cluster_at_.assign(side * side, -1);
@@ -359,6 +355,7 @@ class WindowOptimizer::Solver {
     Vector6d gradient;
   };
   std::vector<Cluster> clusters_;
+  std::vector<FactorColumn> gradients_;
   std::vector<int> cluster_at_;
   Eigen::MatrixXd damped_, known_, units_, solved_;
   Eigen::LLT<Eigen::MatrixXd> factor_;

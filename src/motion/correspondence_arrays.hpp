@@ -20,6 +20,8 @@ class CorrespondenceArrays {
   explicit CorrespondenceArrays(const std::vector<Correspondence>& correspondences);
 
   int count() const { return count_; }
+  /// Six arrays of roundedUp(count()) numbers, zeros beyond the count: x, y, z of the points, u_left, v_left, u_right.
+  const double* values() const { return values_.data(); }
 
   /// Correspondences in a register.
   static constexpr int kLanes = 4;
@@ -39,7 +41,7 @@ class CorrespondenceArrays {
 
  private:
   int count_;
-  std::vector<double> values_;  ///< six arrays: x, y, z of the points, u_left, v_left, u_right
+  std::vector<double> values_;
 };
 
 }  // namespace sdvo

@@ -659,14 +659,17 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(const St
   const bool is_sound = !state_.doubt.lasts();
   const bool was_beyond_doubt = search_.isBeyondDoubt(found, largestDoubt());
   Candidate candidate = adjust(features, scene.map, found, is_sound);
+  const std::size_t adjusted = found.sightings.size();
   found.reject(candidate.adjustment.rejected);
   if (!was_beyond_doubt || search_.isBeyondDoubt(found, largestDoubt())) return candidate;
   MotionScene suspected = scene;
   suspected.is_suspected = true;
   MotionHypothesis chosen = search_.find(suspected, largestDoubt());
   if (!chosen.motion.success) return candidate;
-  found = std::move(chosen);
-  candidate = adjust(features, scene.map, found, is_sound);
+  const Eigen::Isometry3d T_adjusted = std::exchange(found, std::move(chosen)).motion.T_current_reference;
+  // Mostly the first motion prevails, and its adjustment is known.
+  if (found.sightings.size() != adjusted || found.motion.T_current_reference.matrix() != T_adjusted.matrix())
+    candidate = adjust(features, scene.map, found, is_sound);
   found.reject(candidate.adjustment.rejected);
   return candidate;
 }

@@ -9,10 +9,74 @@
 
 #include "../common/statistics.hpp"
 #include "../motion/pose_problem.hpp"
+#include "../motion/projected.hpp"
 #include "row_delay.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
+namespace {
+
+constexpr int kUnknowns = 9;  // a left perturbation of the motion (m, rad), and the rotation
+
+/// Noise of the equations, and where they are linearised.
+struct RotationEquations {
+  Projection projection;
+  double inverse_noise[3];  ///< of u, v and disparity, 1/px
+  double rotation[3];       ///< rad
+};
+
+/// The Hessian's upper triangle, and columns that each correspondence adds to the gradient.
+struct AddRotationEquations {
+  static SDVO_IN_KERNEL void run(const RotationEquations* equations, const double* values, std::ptrdiff_t stride,
+                                 int count, DoubleLanes* hessian, double* gradients) {
+    constexpr double kCauchy = noiseGate(3);  // squared scale of Cauchy's kernel, in standard deviations
+    const Projection& p = equations->projection;
+    const double inverse_fx = 1.0 / p.fx, inverse_fy = 1.0 / p.fy;
+    for (int k = 0; k < count; k += CorrespondenceArrays::kLanes) {
+      const Projected at(p, values + k, stride);
+      DoubleLanes x, y;  // in the right image
+      load(values + 4 * stride + k, y), load(values + 5 * stride + k, x);
+      x = (x - p.cx) * inverse_fx, y = (y - p.cy) * inverse_fy;
+      const double *n = equations->inverse_noise, *w = equations->rotation;
+      const DoubleLanes a = n[0] * p.fx * at.inverse_depth, b = n[1] * p.fy * at.inverse_depth;
+      const DoubleLanes left = -a * at.x * at.inverse_depth, down = -b * at.y * at.inverse_depth;
+      // The disparity replaces u_right, whose error is mostly that of u_left.
+      const DoubleLanes nearer = -n[2] * p.fx_baseline * at.inverse_depth * at.inverse_depth;
+      const DoubleLanes turned[3] = {-n[2] * p.fx * x * y, n[2] * p.fx * (1.0 + x * x), -n[2] * p.fx * y};
+      const DoubleLanes u = n[0] * at.u_left, v = n[1] * at.v;
+      const DoubleLanes disparity =
+          n[2] * (at.u_left - at.u_right) - (turned[0] * w[0] + turned[1] * w[1] + turned[2] * w[2]);
+      const DoubleLanes index = DoubleLanes{0.0, 1.0, 2.0, 3.0} + static_cast<double>(k), zero{};
+      DoubleLanes weight = kCauchy / (kCauchy + (u * u + v * v + disparity * disparity));
+      weight = index < static_cast<double>(count) ? weight : zero;
+      weight = at.behind ? zero : weight;
+
+      DoubleLanes gradient[kUnknowns] = {};
+      const DoubleLanes of_u[] = {a, left, left * at.y, a * at.z - left * at.x, -a * at.y};
+      const DoubleLanes of_v[] = {b, down, down * at.y - b * at.z, -down * at.x, b * at.x};
+      const DoubleLanes of_disparity[] = {nearer, nearer * at.y, -nearer * at.x, turned[0], turned[1], turned[2]};
+      addRow(of_u, {0, 2, 3, 4, 5}, weight, u, hessian, gradient);
+      addRow(of_v, {1, 2, 3, 4, 5}, weight, v, hessian, gradient);
+      addRow(of_disparity, {2, 3, 4, 6, 7, 8}, weight, disparity, hessian, gradient);
+      for (int i = 0; i < kUnknowns; ++i) store(gradient[i], gradients + i * stride + k);
+    }
+  }
+
+  template <int kCount>
+  static SDVO_IN_KERNEL void addRow(const DoubleLanes (&row)[kCount], const int (&columns)[kCount],
+                                    const DoubleLanes& weight, const DoubleLanes& residual, DoubleLanes* hessian,
+                                    DoubleLanes* gradient) {
+#pragma GCC unroll 6
+    for (int i = 0; i < kCount; ++i) {
+      const DoubleLanes weighted = weight * row[i];
+      gradient[columns[i]] += weighted * residual;
+#pragma GCC unroll 6
+      for (int j = i; j < kCount; ++j) hessian[kUnknowns * columns[i] + columns[j]] += weighted * row[j];
+    }
+  }
+};
+
+}  // namespace
 
 Eigen::Matrix<double, 2, 3> rotationJacobian(const StereoCamera& camera, double u, double v) {
   const double x = (u - camera.cx) / camera.fx, y = (v - camera.cy) / camera.fy;
@@ -53,40 +117,41 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
                                                    const std::vector<int>& inliers,
                                                    const Eigen::Isometry3d& T_current_reference) {
   constexpr double kSmall = 0.01;  // squared standard deviations (chosen): equations from before such a step serve
-  constexpr int kSteps = 3, kMotion = 6, kUnknowns = kMotion + 3;
-  constexpr double kCauchy = noiseGate(3);  // squared scale of Cauchy's kernel, in standard deviations
+  constexpr int kSteps = 3, kMotion = 6;
   using Vector = Eigen::Matrix<double, kUnknowns, 1>;
   using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
   if (static_cast<int>(inliers.size()) < kFewestMeasured) return std::nullopt;
   const double of_disparity = std::hypot(noise.disparity, noise.common_disparity);
-  const Eigen::Vector3d scale = Eigen::Vector3d(noise.corner, noise.corner, of_disparity).cwiseInverse();
+  std::vector<Correspondence> some;
+  std::vector<int> parts;
+  some.reserve(inliers.size()), parts.reserve(inliers.size());
+  for (const int i : inliers) {
+    const Correspondence& c = some.emplace_back(correspondences[static_cast<std::size_t>(i)]);
+    parts.push_back(RowDelay::cellOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height));
+  }
+  const CorrespondenceArrays arrays(some);
+  const std::ptrdiff_t stride = CorrespondenceArrays::roundedUp(arrays.count());
+  std::vector<double> columns(static_cast<std::size_t>(kUnknowns * stride));
 
   Eigen::Isometry3d T = T_current_reference;
   RightRotation found;
   Matrix hessian;
   std::array<Vector, RowDelay::kParts> gradients;
   for (int step = 0;; ++step) {
+    const RotationEquations equations{Projection(camera, T),
+                                      {1.0 / noise.corner, 1.0 / noise.corner, 1.0 / of_disparity},
+                                      {found.value.x(), found.value.y(), found.value.z()}};
+    DoubleLanes sums[kUnknowns * kUnknowns] = {};
+    runKernel<AddRotationEquations>(&equations, arrays.values(), stride, arrays.count(), +sums, columns.data());
     hessian.setIdentity();  // prior of a baseline and 1 rad, for what the view does not constrain
     hessian.diagonal().head<3>() /= camera.baseline * camera.baseline;
+    for (int i = 0; i < kUnknowns; ++i)
+      for (int j = i; j < kUnknowns; ++j)
+        hessian(i, j) += total(sums[kUnknowns * i + j]), hessian(j, i) = hessian(i, j);
     gradients.fill(Vector::Zero());
-    for (const int i : inliers) {
-      const Correspondence& c = correspondences[static_cast<std::size_t>(i)];
-      std::optional<Eigen::Vector3d> residual = reprojectionResidual(camera, T, c);
-      if (!residual) continue;
-      Eigen::Matrix<double, 3, kUnknowns> jacobian = Eigen::Matrix<double, 3, kUnknowns>::Zero();
-      jacobian.leftCols<kMotion>() = motionJacobian(camera, T, c.point);
-      // The disparity replaces u_right, whose error is mostly that of u_left.
-      jacobian.row(2) = jacobian.row(0) - jacobian.row(2);
-      jacobian.bottomRightCorner<1, 3>() = -rotationJacobian(camera, c.measurement.z(), c.measurement.y()).row(0);
-      (*residual)[2] = (*residual)[0] - (*residual)[2] - jacobian.bottomRightCorner<1, 3>().dot(found.value);
-      jacobian = scale.asDiagonal() * jacobian;
-      *residual = scale.cwiseProduct(*residual);
-      const double weight = kCauchy / (kCauchy + residual->squaredNorm());
-      const Eigen::Matrix<double, kUnknowns, 3> weighted = weight * jacobian.transpose();
-      hessian += weighted.lazyProduct(jacobian);  // a general product takes six times as long
-      const int part = RowDelay::cellOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height);
-      gradients[static_cast<std::size_t>(part)] += weighted * *residual;
-    }
+    for (std::size_t k = 0; k < parts.size(); ++k)
+      for (int i = 0; i < kUnknowns; ++i)
+        gradients[static_cast<std::size_t>(parts[k])][i] += columns[static_cast<std::size_t>(i * stride) + k];
     if (step == kSteps) break;
     Vector gradient = Vector::Zero();
     for (const Vector& of_part : gradients) gradient += of_part;

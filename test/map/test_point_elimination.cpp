@@ -194,6 +194,10 @@ TEST(PointElimination, GradientsOfSightingsAndPointsAddUp) {
   }
   sum.tail<kCalibration>() = reduced.point.calibration_gradient;
   expectNear(sum, reduced.gradient, "gradient");
+  const Eigen::Matrix<double, 6, Eigen::Dynamic> by = Eigen::MatrixXd::Random(6, sum.size());
+  std::vector<FactorColumn> moved(1);
+  sumGradients({reduced.point}, reduced.factors, by, moved);
+  expectNear(moved[0].head<6>(), by * sum, "gradient times a matrix");
 }
 
 TEST(PointElimination, SightingsFromBehindCostButDoNotPull) {
