@@ -7,10 +7,10 @@
 #include <utility>
 
 #include "../belief/belief.hpp"
-#include "../belief/motion_search.hpp"
 #include "../common/stopwatch.hpp"
 #include "../map/reacquisition.hpp"
 #include "odometry_state.hpp"
+#include "pair_search.hpp"
 
 namespace sdvo {
 namespace {
@@ -78,29 +78,6 @@ class VisualOdometry::Impl {
  private:
   using Step = OdometryStep;
 
-  /// A pair as it is searched: in the map's camera, without repeated rows, with the right image rotated back and
-  /// synchronous, all rows of one moment.
-  struct Pair {
-    const StereoFeatures& given;
-    std::optional<StereoFeatures> refocused{}, new_part{}, rotated_back{}, synchronised{};
-    std::optional<RolledPair> rolled{};      ///< only with a rolling shutter, as the next three
-    std::optional<StereoFeatures> global{};  ///< rows moved to the stamp
-    std::optional<RolledPair> newest{};      ///< of the map, with its velocity since the pair's motion is known
-    std::optional<LocalMap> map{};           ///< with this velocity
-    std::vector<int> new_features{};
-    double dt = 0.0;               ///< since the previous pair, s
-    double frozen = kUnsuspected;  ///< log-odds that its images repeat although the camera moved
-    /// Without a map of its camera; after an outage; with repeated images; after a pose.
-    enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;
-    ShownRotation rotation{};  ///< of the right camera beyond the known one
-
-    const StereoFeatures& whole() const { return refocused ? *refocused : given; }
-    const StereoFeatures& part() const { return new_part ? *new_part : whole(); }
-    const StereoFeatures& taken() const { return rotated_back ? *rotated_back : part(); }
-    const StereoFeatures& inStep() const { return synchronised ? *synchronised : taken(); }
-    const StereoFeatures& features() const { return global ? *global : inStep(); }
-  };
-
   /// The map with the pair, adjusted. The state does not change until commit().
   struct Candidate {
     RigCalibration calibration;
@@ -112,45 +89,40 @@ class VisualOdometry::Impl {
     double distance = 0.0;                ///< from that key frame, m
   };
 
+  /// What becomes of a pair with a motion: why it cannot join the map, or the map with it.
+  struct Outcome {
+    std::string refusal;
+    std::optional<Candidate> candidate;
+    double since = 0.0;         ///< the map's newest pair, s
+    bool is_seed = false;       ///< it is measured against the seed, ...
+    bool starts_again = false;  ///< ... whose pose is not that of the guesses
+    bool comes_back = false;    ///< it is in the map that was left
+  };
+
   void refuse(const StereoFeatures& features) const;
   OdometryResult sound(OdometryResult result);
-  Pair prepared(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
-  void compensate(Pair& pair) const;
-  void roll(Pair& pair, const Vector6d& velocity) const;
-  bool rollAgain(Pair& pair, const MotionHypothesis& found) const;
-  void rememberRolled(Pair& pair, const MotionHypothesis& found, Step& step);
-  void search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
-              MotionHypothesis& found) const;
-  std::optional<Eigen::Isometry3d> expectedMotion(double dt, const std::optional<MotionGuess>& guess) const;
-  double logOddsOfFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
-  std::optional<StereoFeatures> synchronised(const StereoFeatures& taken, double dt, const Vector6d& velocity) const;
-  MotionScene sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
-                      const std::optional<MotionGuess>& guess) const;
-  std::optional<MotionScene> reacquire(const StereoFeatures& features) const;
-  double largestDoubt() const;
   std::optional<Floor> floor() const;
 
-  void begin(const Pair& pair, const std::optional<MotionGuess>& guess);
-  std::optional<MeasuredPair> measuredPair(const Pair& pair, const MotionHypothesis& found) const;
-  std::vector<Evidence> evidenceAgainst(const Pair& pair, const MotionHypothesis& found,
-                                        const std::optional<MeasuredPair>& measured);
-  Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt,
-                 const std::vector<Evidence>& evidence);
-  Candidate adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found);
-  Candidate adjust(const StereoFeatures& features, const LocalMap& before, const MotionHypothesis& found,
-                   bool may_recall);
+  void begin(const PairSearch& pair, const std::optional<MotionGuess>& guess);
+  std::optional<MeasuredPair> measuredPair(const PairSearch& pair) const;
+  std::vector<Evidence> evidenceAgainst(const PairSearch& pair, const std::optional<MeasuredPair>& measured);
+  Step unmeasured(const PairSearch& pair, const std::string& why, const std::vector<Evidence>& evidence);
+  Outcome judged(PairSearch& pair);
+  Candidate adjustBeyondDoubt(PairSearch& pair);
+  Candidate adjust(const PairSearch& pair, bool may_recall);
+  Step apply(const Outcome& outcome, const PairSearch& pair, const std::vector<Evidence>& evidence);
   void commit(const Candidate& candidate, const Belief& belief);
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
-  void widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief, Step& step);
-  std::string doubtWords(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
-                         const Belief& belief) const;
+  void widen(const PairSearch& pair, const Belief& belief, Step& step);
+  std::string doubtWords(const PairSearch& pair, const Candidate& candidate, const Belief& belief) const;
+  std::string endOutage(const Outcome& outcome, const MotionHypothesis& found);
   bool isDoubtful(const Belief& belief) const;
-  void finish(const Pair& pair, Step& step);
+  void rememberRolled(PairSearch& pair, Step& step);
+  void finish(const PairSearch& pair, Step& step);
 
   VisualOdometryOptions options_;
   Eigen::Isometry3d T_base_camera_;
-  MotionSearch search_;
-  Reacquisition reacquisition_;
+  SearchTools tools_;
   Revisit revisit_;
   WindowOptimizer optimizer_;
   OdometryState state_;
@@ -190,16 +162,14 @@ std::vector<Eigen::Vector3d> VisualOdometry::mapPoints() const {
 VisualOdometry::Impl::Impl(const VisualOdometryOptions& options)
     : options_(checked(options).withOneNoise()),
       T_base_camera_(lookingAhead()),
-      search_(FeatureMatcherOptions(), options_.motion, alignmentWith(options_.noise)),
-      reacquisition_(FeatureMatcherOptions(), options_.motion),
+      tools_(options_),
       revisit_(FeatureMatcherOptions(), options_.motion, alignmentWith(options_.noise)),
       optimizer_(windowWith(options_.noise)),
       state_(options_, 0) {}
 
 void VisualOdometry::Impl::configure(const VisualOdometryOptions& options) {
   options_ = checked(options).withOneNoise();
-  search_ = MotionSearch(FeatureMatcherOptions(), options_.motion, alignmentWith(options_.noise));
-  reacquisition_ = Reacquisition(FeatureMatcherOptions(), options_.motion);
+  tools_ = SearchTools(options_);
   revisit_ = Revisit(FeatureMatcherOptions(), options_.motion, alignmentWith(options_.noise));
   optimizer_ = WindowOptimizer(windowWith(options_.noise));
   state_.prior.configure(options.tracking);
@@ -233,32 +203,21 @@ void VisualOdometry::Impl::takePose(const Matrix6d& covariance) {
 OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
   refuse(given);
   if (guess) guess->check();
-  Pair pair = prepared(given, guess);
-  std::optional<MotionScene> scene;
-  MotionHypothesis found;
-  search(pair, guess, scene, found);
-  const StereoFeatures& features = pair.features();
+  PairSearch pair(options_, tools_, state_, given, guess);
 
   // The state has not changed so far, and from here on no input is rejected.
   Stopwatch stopwatch;
   begin(pair, guess);
-  const std::optional<MeasuredPair> measured = measuredPair(pair, found);
-  const std::vector<Evidence> evidence = evidenceAgainst(pair, found, measured);
-  Step step;
-  if (found.motion.success) {
-    step = extendMap(features, *scene, found, pair.dt, evidence);
-  } else {
-    state_.doubt.raise(evidence);
-    if (pair.is == Pair::kFrozen) step = holdPose(pair.dt, state_);
-    if (pair.is == Pair::kFollowed) step = predictMotion(options_, features, pair.dt, found.motion.reason, state_);
-    if (pair.is == Pair::kFirst || pair.is == Pair::kSought) step = startMap(options_, features, state_);
-  }
-  state_.rig.learn(features, measured ? &*measured : nullptr, found, pair.rotation,
-                   step.state == TrackingState::kTracking && scene);
+  const std::optional<MeasuredPair> measured = measuredPair(pair);
+  const std::vector<Evidence> evidence = evidenceAgainst(pair, measured);
+  const Outcome outcome = judged(pair);
+  Step step = outcome.candidate ? apply(outcome, pair, evidence) : unmeasured(pair, outcome.refusal, evidence);
+  state_.rig.learn(pair.features(), measured ? &*measured : nullptr, pair.found(), pair.rotation(),
+                   step.state == TrackingState::kTracking && pair.scene());
   finish(pair, step);
-  rememberRolled(pair, found, step);
+  rememberRolled(pair, step);
   step.time = stopwatch.lap();
-  return sound(state_.report(features, pair.new_features, found, step, floor()));
+  return sound(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
 }
 
 /// The only way out of update(): no result leaves with a number that is not finite or a covariance that is none.
@@ -284,253 +243,32 @@ void VisualOdometry::Impl::refuse(const StereoFeatures& features) const {
                                 std::to_string(*state_.last_stamp) + " ns");
 }
 
-/// Prepares a pair for the search of its motion.
-VisualOdometry::Impl::Pair VisualOdometry::Impl::prepared(const StereoFeatures& given,
-                                                          const std::optional<MotionGuess>& guess) const {
-  Pair pair{given};
-  // A focusing lens changes the camera with every pair, but the pixels of a map are of one camera.
-  if (state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera))
-    pair.refocused = given.seenBy(*state_.camera);
-  if (state_.last_stamp) pair.dt = static_cast<double>(given.stamp - *state_.last_stamp) * 1e-9;
-  const std::optional<Eigen::Isometry3d> expected = expectedMotion(pair.dt, guess);
-  pair.new_features = state_.images.newFeatures(pair.whole(), state_.rig.noise.sameMotion(), expected);
-  if (static_cast<int>(pair.new_features.size()) < given.count())
-    pair.new_part = pair.whole().select(pair.new_features);
-  const StereoFeatures& taken = pair.taken();
-  if (!state_.map || !state_.map->continuedBy(taken))
-    pair.is = Pair::kFirst;
-  else if (state_.interrupted)
-    pair.is = Pair::kSought;
-  else if ((pair.frozen = logOddsOfFrozen(taken, pair.dt, guess)) >= kCertain)
-    pair.is = Pair::kFrozen;
-  else
-    pair.is = Pair::kFollowed;
-  compensate(pair);
-  return pair;
-}
-
-/// Features as of a right camera that did not rotate and is synchronous.
-void VisualOdometry::Impl::compensate(Pair& pair) const {
-  const LearntRig& rig = state_.rig;
-  const bool is_new = pair.rotation.log_odds > 0.0;
-  const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + pair.rotation.value) : rig.rotation;
-  pair.rotated_back.reset();
-  if (!rotation.isZero()) pair.rotated_back = rotatedBack(pair.part(), rotation);
-  const bool has_map = pair.is == Pair::kFollowed || pair.is == Pair::kSought;
-  const bool is_predicted = has_map && state_.prior.velocity() && pair.dt <= options_.tracking.max_gap;
-  if (is_predicted) pair.synchronised = synchronised(pair.taken(), pair.dt, *state_.prior.velocity());
-  roll(pair, is_predicted ? *state_.prior.velocity() : Vector6d::Zero());
-}
-
-/// Moves all rows to the stamp, by the velocity of the camera there.
-void VisualOdometry::Impl::roll(Pair& pair, const Vector6d& velocity) const {
-  if (!state_.shutter.isRolling()) return;
-  pair.rolled = RolledPair{pair.inStep(), velocity};
-  pair.global = state_.shutter.asGlobal(*pair.rolled);
-}
-
-/// Moves rows of the pair, and of the map's newest one, by the velocities that the pair's motion implies. False if they
-/// are moved so already.
-bool VisualOdometry::Impl::rollAgain(Pair& pair, const MotionHypothesis& found) const {
-  const RollingShutter& shutter = state_.shutter;
-  const auto changes = [&](RolledPair& rolled, const Vector6d& velocity) {
-    if (shutter.isNegligible(rolled.features.camera, velocity - rolled.velocity)) return false;
-    rolled.velocity = velocity;
-    return true;
-  };
-  RolledPair& now = *pair.rolled;
-  now.forgetMotion();
-  now.rate_by_rows = shutter.rateByRows(now, found);
-  bool has_changed = false;
-  if (pair.is == Pair::kFollowed) {
-    const Eigen::Isometry3d motion = found.motion.T_current_reference.inverse();
-    now.dt = state_.prior.interval(state_.map->secondsUntil(now.features), motion);
-    now.mean = logSE3(motion) / now.dt;
-    if (state_.newest && state_.newest->features.stamp == state_.map->newestStamp()) {
-      const RolledPair& newest = *state_.newest;
-      now.mean_before = newest.mean;
-      if (!pair.newest) pair.newest = newest;
-      if (changes(*pair.newest, shutter.velocityBetween(newest, *now.mean))) {
-        has_changed = true;
-        pair.map = state_.map;
-        pair.map->moveNewest(shutter.asGlobal(newest), shutter.asGlobal(*pair.newest),
-                             state_.rig.calibration.calibration());
-      }
-    }
-  }
-  if (changes(now, shutter.velocityAt(now))) {
-    has_changed = true;
-    pair.global = shutter.asGlobal(now);
-  }
-  return has_changed;
-}
-
-/// Widens covariances by the error of the pair's velocity, and keeps the pair until the next motion is known.
-void VisualOdometry::Impl::rememberRolled(Pair& pair, const MotionHypothesis& found, Step& step) {
-  const auto ends_with_it = [&](const std::optional<LocalMap>& map) {
-    return map && map->newestStamp() == pair.given.stamp;
-  };
-  if (!pair.rolled || (!ends_with_it(state_.map) && !ends_with_it(state_.seed))) return;
-  RolledPair& rolled = *pair.rolled;
-  if (!found.motion.success || !step.T_previous_current) {
-    rolled.forgetMotion();
-  } else {
-    const Matrix6d moment = state_.shutter.momentOf(rolled);
-    step.covariance += moment;
-    state_.covariance.doubt(moment, moment);
-  }
-  if (state_.newest && rolled.mean) state_.shutter.learn(*state_.newest, *rolled.mean);
-  state_.newest = std::move(pair.rolled);
-}
-
-/// Searches the pair's motion in the map, after an outage also in the seed. If the camera turns otherwise than
-/// expected, or the right one seems to have rotated, features are compensated again and the search is repeated. Without
-/// a motion of most matches, a yaw of the right camera is tried; it is kept if more matches agree.
-void VisualOdometry::Impl::search(Pair& pair, const std::optional<MotionGuess>& guess,
-                                  std::optional<MotionScene>& scene, MotionHypothesis& found) const {
-  const auto find = [&] {
-    scene.reset();
-    if (pair.is == Pair::kFollowed)
-      scene.emplace(sceneOf(pair.map ? *pair.map : *state_.map, pair.features(), pair.dt, guess));
-    if (pair.is == Pair::kSought)
-      if (auto place = reacquire(pair.features())) scene.emplace(std::move(*place));
-    found = scene ? search_.find(*scene, largestDoubt()) : MotionHypothesis();
-    if (!found.motion.success) return Vector6d(Vector6d::Zero());
-    const Eigen::Isometry3d motion = found.motion.T_current_reference.inverse();
-    return Vector6d(logSE3(motion) / state_.prior.interval(scene->map.secondsUntil(pair.features()), motion));
-  };
-  const auto findSynchronised = [&] {
-    constexpr double kNegligible = 0.02;  // px (chosen): a fifth of a disparity's noise
-    const Vector6d velocity = find();
-    if (pair.is != Pair::kFollowed || !pair.synchronised || !found.motion.success) return velocity;
-    const double delay = pair.taken().right_delay + state_.rig.calibration.delay();
-    const double unexpected = (velocity - *state_.prior.velocity()).tail<3>().norm();
-    if (std::abs(delay) * pair.given.camera.fx * unexpected < kNegligible) return velocity;
-    pair.synchronised = synchronised(pair.taken(), pair.dt, velocity);
-    roll(pair, velocity);
-    return find();
-  };
-  const auto findGlobal = [&] {
-    constexpr int kPasses = 3;  // at most; each leaves some hundredths of the velocity's error
-    Vector6d velocity = findSynchronised();
-    for (int pass = 0; pass < kPasses && pair.rolled && found.motion.success && rollAgain(pair, found); ++pass)
-      velocity = find();
-    return velocity;
-  };
-  const auto shownBeyond = [&](const Eigen::Vector3d& supposed) {
-    const Vector6d velocity = findGlobal();
-    const Eigen::Vector3d turn = pair.dt * velocity.tail<3>();
-    const Eigen::Vector3d before = pair.dt * state_.prior.velocity().value_or(Vector6d::Zero()).tail<3>();
-    const Eigen::Matrix3d turns = turn * turn.transpose() + before * before.transpose();
-    return state_.rig.shownRotation(pair.features(), found, supposed, turns, pair.dt);
-  };
-  const auto compensateFor = [&](const ShownRotation& shown) { pair.rotation = shown, compensate(pair); };
-  pair.rotation = shownBeyond(Eigen::Vector3d::Zero());
-  if (pair.is == Pair::kFollowed && scene->T_current_reference && !found.isOfMajority()) {
-    // After a knock beyond the matches' noise no motion explains both views, but the left one alone may be explained.
-    const ShownRotation at_first = pair.rotation;
-    const int inliers = found.agreement.inliers;
-    const Eigen::Vector3d yaw = yawByDisparities(pair.given.camera, found.correspondences, *scene->T_current_reference);
-    compensateFor({yaw, Eigen::Matrix3d::Zero(), kCertain, kUnsuspected});
-    pair.rotation = shownBeyond(yaw);
-    if (!found.motion.success || found.agreement.inliers <= inliers || !(pair.rotation.log_odds > 0.0))
-      compensateFor(at_first), findGlobal();
-  }
-  if (!(pair.rotation.log_odds > 0.0)) return;
-  compensate(pair);
-  findGlobal();
-}
-
-/// Expected motion over the `dt` s since the previous pair: the guess, else the prediction.
-std::optional<Eigen::Isometry3d> VisualOdometry::Impl::expectedMotion(double dt,
-                                                                      const std::optional<MotionGuess>& guess) const {
-  if (guess) return motionBy(*guess, state_.prior, dt);
-  if (state_.interrupted || !state_.prior.velocity() || dt > options_.tracking.max_gap) return std::nullopt;
-  return state_.prior.predicted(dt).motion;
-}
-
-/// Log-odds that images repeat although the camera moved. The guess, or the last motion, implies whether it did. A
-/// robot may stop from one pair to the next as far as the prior allows; the first repeated pair decides.
-double VisualOdometry::Impl::logOddsOfFrozen(const StereoFeatures& features, double dt,
-                                             const std::optional<MotionGuess>& guess) const {
-  const RepeatedImages& images = state_.images;
-  if (!images.repeat(features)) return kUnsuspected;
-  const auto moved = [&](const Eigen::Isometry3d& T_previous_current) {
-    return RepeatedImages::shouldHaveMoved(features, state_.rig.noise.sameMotion(), T_previous_current);
-  };
-  if (guess && !guess->rotation_only) return moved(guess->T_previous_current) ? kCertain : kUnsuspected;
-  if (state_.frozen) return kCertain;
-  Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
-  if (guess) turn.linear() = guess->T_previous_current.linear();
-  if (moved(turn)) return kCertain;
-  const auto prior = state_.prior.confirmed(*state_.last_stamp, dt);
-  const auto expected = expectedMotion(dt, std::nullopt);
-  if (!prior || !moved(expected.value_or(prior->motion))) return kUnsuspected;
-  if (images.comeTwice()) return kCertain;
-  if (images.inARow() > 0 && images.logOddsOfOld() < kCertain) return kUnsuspected;
-  const double stop = 0.5 * prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero());
-  return std::min(images.logOddsOfOld() + std::min(stop, -std::log(kTailProbability)), kCertain);
-}
-
-/// The map, the pair, and the expected motion between them: that of predicted pairs since the reference, then the
-/// velocity or the guess.
-MotionScene VisualOdometry::Impl::sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
-                                          const std::optional<MotionGuess>& guess) const {
-  const MotionPrior& prior = state_.prior;
-  MotionScene scene{map,
-                    state_.rig.calibration.calibration(),
-                    features,
-                    {},
-                    {},
-                    {},
-                    state_.doubt.lasts(),
-                    state_.doubt.logOdds() > largestDoubt(),
-                    options_.tracking.doubtful_deviation,
-                    state_.rig.noise};
-  const Eigen::Isometry3d T_reference_previous = map.newestPose() * state_.T_origin_camera;
-  const double since = map.secondsUntil(features);
-  if (const auto confirmed = prior.confirmed(map.newestStamp(), since)) scene.prior.push_back(*confirmed);
-  if (prior.velocity() && dt <= options_.tracking.max_gap)
-    scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
-  if (guess) {
-    scene.guess = (T_reference_previous * motionBy(*guess, prior, dt)).inverse();
-    if (!scene.prior.empty()) scene.prior.push_back(prior.around(scene.guess->inverse(), since));
-  }
-  return scene;
-}
-
-/// The features at the time of the left image; none if no delay is known.
-std::optional<StereoFeatures> VisualOdometry::Impl::synchronised(const StereoFeatures& taken, double dt,
-                                                                 const Vector6d& velocity) const {
-  const double known = state_.rig.calibration.delay();
-  if (taken.right_delay + known == 0.0) return std::nullopt;
-  return state_.rig.right_delay.synchronised(taken, dt, velocity, known);
-}
-
 /// The pair with its measured motion; none without a motion, or with one that spans an outage.
-std::optional<MeasuredPair> VisualOdometry::Impl::measuredPair(const Pair& pair, const MotionHypothesis& found) const {
-  if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return std::nullopt;
+std::optional<MeasuredPair> VisualOdometry::Impl::measuredPair(const PairSearch& pair) const {
+  const MotionHypothesis& found = pair.found();
+  if (!found.motion.success || state_.interrupted || !(pair.dt() > 0.0)) return std::nullopt;
   const StereoFeatures& taken = pair.taken();
   const Eigen::Isometry3d& motion = found.motion.T_current_reference;
   const double since = state_.prior.interval(state_.map->secondsUntil(taken), motion);
   return MeasuredPair{
-      taken, state_.prior.interval(pair.dt, motion), motion, since,
+      taken, state_.prior.interval(pair.dt(), motion), motion, since,
       rowMotions(taken, found, since, state_.rig.row_pattern, taken.right_delay + state_.rig.calibration.delay())};
 }
 
 /// Evidence of the pair that its motion is not the camera's.
-std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const Pair& pair, const MotionHypothesis& found,
+std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const PairSearch& pair,
                                                             const std::optional<MeasuredPair>& measured) {
   LearntRig& rig = state_.rig;
+  const bool is_followed = pair.kind() == PairSearch::kFollowed;
   // The map is from before the rotation.
-  std::vector<Evidence> evidence{{pair.rotation.log_odds, pair.rotation.words()},
-                                 {pair.rotation.other_moment, "the right image seemed to be of another moment"}};
+  std::vector<Evidence> evidence{{pair.rotation().log_odds, pair.rotation().words()},
+                                 {pair.rotation().other_moment, "the right image seemed to be of another moment"}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
-  if (pair.is == Pair::kFollowed)
-    evidence.push_back({pair.frozen, "images as of the previous pair, by a stop or a frozen driver", true});
+  if (is_followed)
+    evidence.push_back({pair.frozen(), "images as of the previous pair, by a stop or a frozen driver", true});
   // After a short gap, the views may not be of one rigid world, and the next map would be as wrong.
-  if (pair.is == Pair::kFollowed && !found.motion.success && found.agreement.matches >= kManyMatches &&
-      pair.dt <= options_.tracking.max_gap)
+  if (is_followed && !pair.found().motion.success && pair.found().agreement.matches >= kManyMatches &&
+      pair.dt() <= options_.tracking.max_gap)
     evidence.push_back({kCertain, "many matches agreed on no motion", true});
   if (!measured) return evidence;
   rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
@@ -542,141 +280,123 @@ std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const Pair& pair, co
   return evidence;
 }
 
-/// Log-odds that a motion is not the camera's, above which it is doubtful.
-double VisualOdometry::Impl::largestDoubt() const {
-  return logOdds(1.0 - options_.tracking.probability);
-}
-
-/// Searches the pair in the map from before an outage, in the one before that, then in the seed. The camera's motion
-/// meanwhile is unknown.
-std::optional<MotionScene> VisualOdometry::Impl::reacquire(const StereoFeatures& features) const {
-  std::optional<MotionScene> scene;
-  for (const LocalMap* map : {&*state_.map, state_.left ? &state_.left->map : nullptr}) {
-    if (!map || !map->continuedBy(features)) continue;
-    const auto place = reacquisition_.find(*map, features, state_.rig.calibration.calibration());
-    const double since = map->secondsUntil(features);
-    if (!place || !state_.prior.tooFast(place->T_current_newest.inverse(), Matrix6d::Zero(), since).empty()) continue;
-    scene.emplace(sceneOf(*map, features, 0.0, std::nullopt));
-    scene->place = weigh(*place, scene->prior);
-    scene->T_current_reference = scene->place->T_current_newest;
-    scene->prior.clear();
-    return scene;
-  }
-  if (state_.seed) scene.emplace(sceneOf(*state_.seed, features, 0.0, std::nullopt));
-  return scene;
-}
-
 /// Updates what each pair changes, whatever its motion.
-void VisualOdometry::Impl::begin(const Pair& pair, const std::optional<MotionGuess>& guess) {
+void VisualOdometry::Impl::begin(const PairSearch& pair, const std::optional<MotionGuess>& guess) {
   const StereoFeatures& features = pair.features();
   if (state_.camera && *state_.camera != features.camera) state_.forgetRig(options_);
   state_.camera = features.camera;
   state_.last_stamp = features.stamp;
   ++state_.pairs;
-  if (pair.dt <= options_.tracking.max_gap) state_.prior.noteInterval(pair.dt);
-  state_.outage.extend(pair.dt, guess, state_.prior);
-  state_.rig.calibration.predict(std::min(pair.dt, options_.tracking.max_gap));  // a clock's jump ages no rig
-  if (pair.rotation.log_odds > 0.0) state_.rig.rotate(pair.rotation, features.camera);
+  if (pair.dt() <= options_.tracking.max_gap) state_.prior.noteInterval(pair.dt());
+  state_.outage.extend(pair.dt(), guess, state_.prior);
+  state_.rig.calibration.predict(std::min(pair.dt(), options_.tracking.max_gap));  // a clock's jump ages no rig
+  if (pair.rotation().log_odds > 0.0) state_.rig.rotate(pair.rotation(), features.camera);
 }
 
-/// Updates the state by the pair's step.
-void VisualOdometry::Impl::finish(const Pair& pair, Step& step) {
-  const StereoFeatures& features = pair.features();
-  state_.doubt.fade();
-  const auto stood = [&step] {
-    const Vector6d motion = logSE3(*step.T_previous_current);
-    return mahalanobisSquare(motion, step.covariance) < noiseGate(6);
-  };
-  state_.images.remember(pair.whole(), step.state == TrackingState::kTracking && step.T_previous_current && stood());
-  state_.frozen = pair.is == Pair::kFrozen;
-  if (pair.new_part && step.reason.empty()) step.reason = "a part of the left image repeats that of the previous pair";
-  const bool since_pose = step.T_previous_current && state_.last_pose_stamp;
-  step.dt = since_pose ? static_cast<double>(features.stamp - *state_.last_pose_stamp) * 1e-9 : pair.dt;
-  if (step.T_previous_current) state_.move(*step.T_previous_current);
-  if (!step.hasPose()) return;
-  state_.last_pose_stamp = features.stamp;
-  state_.outage.havePose();
+/// Whether the pair joins the map: its motion may be refused before or after the adjustment.
+VisualOdometry::Impl::Outcome VisualOdometry::Impl::judged(PairSearch& pair) {
+  Outcome outcome;
+  const MotionHypothesis& found = pair.found();
+  outcome.refusal = found.motion.reason;
+  if (!found.motion.success) return outcome;
+  const MotionScene& scene = *pair.scene();
+  outcome.since = scene.map.secondsUntil(pair.features());
+  outcome.is_seed = state_.seed && &scene.map == &*state_.seed;
+  outcome.starts_again = outcome.is_seed && !state_.seed_has_pose;
+  outcome.comes_back = state_.left && &scene.map == &state_.left->map;
+  outcome.refusal =
+      state_.prior.tooFast(found.motion.T_current_reference.inverse(), found.motion.covariance, outcome.since);
+  if (!outcome.refusal.empty()) return outcome;
+  Candidate candidate = adjustBeyondDoubt(pair);
+  outcome.refusal = tools_.motions.chanceWords(scene, found);
+  if (outcome.refusal.empty())
+    outcome.refusal = state_.prior.tooFast(candidate.motion, found.motion.covariance, outcome.since);
+  if (outcome.refusal.empty())
+    outcome.candidate = std::move(candidate);
+  else
+    outcome.refusal += " after the adjustment";
+  return outcome;
 }
 
-/// The pair joins the map unless its motion is rejected, before or after the adjustment.
-VisualOdometry::Impl::Step VisualOdometry::Impl::extendMap(const StereoFeatures& features, const MotionScene& scene,
-                                                           MotionHypothesis& found, double dt,
-                                                           const std::vector<Evidence>& evidence) {
-  const auto passOver = [&](const std::string& why) {
-    state_.doubt.raise(evidence);
-    return state_.interrupted ? startMap(options_, features, state_)
-                              : predictMotion(options_, features, dt, why, state_);
-  };
-  const double since = scene.map.secondsUntil(features);
-  const std::string too_fast =
-      state_.prior.tooFast(found.motion.T_current_reference.inverse(), found.motion.covariance, since);
-  if (!too_fast.empty()) return passOver(too_fast);
-  const Candidate candidate = adjustBeyondDoubt(features, scene, found);
-  std::string refutation = search_.chanceWords(scene, found);
-  if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
-  if (!refutation.empty()) return passOver(refutation + " after the adjustment");
+/// The step of a pair that does not join the map.
+VisualOdometry::Impl::Step VisualOdometry::Impl::unmeasured(const PairSearch& pair, const std::string& why,
+                                                            const std::vector<Evidence>& evidence) {
+  state_.doubt.raise(evidence);
+  if (pair.kind() == PairSearch::kFrozen) return holdPose(pair.dt(), state_);
+  if (pair.kind() == PairSearch::kFollowed) return predictMotion(options_, pair.features(), pair.dt(), why, state_);
+  return startMap(options_, pair.features(), state_);
+}
 
-  const bool is_seed = state_.seed && &scene.map == &*state_.seed, starts_again = is_seed && !state_.seed_has_pose;
-  const bool comes_back = state_.left && &scene.map == &state_.left->map;
-  if (starts_again) state_.startAgain();
-  if (comes_back) state_.comeBack();
-  if (is_seed) state_.covariance.beginMap();
-  const Belief belief = state_.doubt.weigh(scene, found, evidence);
-  commit(candidate, belief);
-  Step step = measure(found, candidate);
+/// The pair joins the map.
+VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, const PairSearch& pair,
+                                                       const std::vector<Evidence>& evidence) {
+  const MotionHypothesis& found = pair.found();
+  if (outcome.starts_again) state_.startAgain();
+  if (outcome.comes_back) state_.comeBack();
+  if (outcome.is_seed) state_.covariance.beginMap();
+  const Belief belief = state_.doubt.weigh(*pair.scene(), found, evidence);
+  commit(*outcome.candidate, belief);
+  Step step = measure(found, *outcome.candidate);
   const Matrix6d measured = step.covariance;
-  widen(scene, found, belief, step);
-  const std::string doubt = doubtWords(scene, found, candidate, belief);
-  step.state = doubt.empty() && !starts_again ? TrackingState::kTracking : TrackingState::kDegraded;
+  widen(pair, belief, step);
+  const std::string doubt = doubtWords(pair, *outcome.candidate, belief);
+  step.state = doubt.empty() && !outcome.starts_again ? TrackingState::kTracking : TrackingState::kDegraded;
   step.probability = belief.probability;
-  step.changes_epoch = starts_again || comes_back;
+  step.changes_epoch = outcome.starts_again || outcome.comes_back;
   if (!doubt.empty()) step.reason = "doubtful: " + doubt;
   // A motion that is probably not the camera's predicts nothing.
   if (belief.probability >= 0.5)
-    state_.prior.takeVelocity(features.stamp, found.motion.T_current_reference.inverse(), since, measured,
-                              doubt.empty(), step.covariance - measured);
+    state_.prior.takeVelocity(pair.features().stamp, found.motion.T_current_reference.inverse(), outcome.since,
+                              measured, doubt.empty(), step.covariance - measured);
   if (options_.planar.planar) {
     const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
     if (step.reason.empty()) step.reason = off;
   }
-  state_.outage.end();
-  state_.seed.reset();
-  if (comes_back) state_.left.reset();
-  if (std::exchange(state_.interrupted, false))
-    step.reason = (starts_again ? kStartedAgain
-                   : is_seed    ? "goes on where the guess had the camera"
-                                : "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map") +
-                  (step.reason.empty() ? "" : "; " + step.reason);
+  const std::string end = endOutage(outcome, found);
+  if (!end.empty()) step.reason = end + (step.reason.empty() ? "" : "; " + step.reason);
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
 }
 
+/// A motion is measured: forgets what an outage left. Returns how it ended; empty if there was none.
+std::string VisualOdometry::Impl::endOutage(const Outcome& outcome, const MotionHypothesis& found) {
+  state_.outage.end();
+  state_.seed.reset();
+  if (outcome.comes_back) state_.left.reset();
+  if (!std::exchange(state_.interrupted, false)) return "";
+  if (outcome.starts_again) return kStartedAgain;
+  if (outcome.is_seed) return "goes on where the guess had the camera";
+  return "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map";
+}
+
 /// Adjusts the map with the pair. If it rejects so many inliers that the motion is not beyond doubt, all hypotheses
 /// compete.
-VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(const StereoFeatures& features,
-                                                                        const MotionScene& scene,
-                                                                        MotionHypothesis& found) {
-  const bool is_sound = !state_.doubt.lasts();
-  const bool was_beyond_doubt = search_.isBeyondDoubt(found, largestDoubt());
-  Candidate candidate = adjust(features, scene.map, found, is_sound);
+VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(PairSearch& pair) {
+  MotionHypothesis& found = pair.found();
+  const MotionSearch& motions = tools_.motions;
+  const double most = largestDoubt(options_.tracking);
+  const bool is_sound = !state_.doubt.lasts(), was_beyond_doubt = motions.isBeyondDoubt(found, most);
+  Candidate candidate = adjust(pair, is_sound);
   const std::size_t adjusted = found.sightings.size();
   found.reject(candidate.adjustment.rejected);
-  if (!was_beyond_doubt || search_.isBeyondDoubt(found, largestDoubt())) return candidate;
-  MotionScene suspected = scene;
+  if (!was_beyond_doubt || motions.isBeyondDoubt(found, most)) return candidate;
+  MotionScene suspected = *pair.scene();
   suspected.is_suspected = true;
-  MotionHypothesis chosen = search_.find(suspected, largestDoubt());
+  MotionHypothesis chosen = motions.find(suspected, most);
   if (!chosen.motion.success) return candidate;
   const Eigen::Isometry3d T_adjusted = std::exchange(found, std::move(chosen)).motion.T_current_reference;
   // Mostly the first motion prevails, and its adjustment is known.
   if (found.sightings.size() != adjusted || found.motion.T_current_reference.matrix() != T_adjusted.matrix())
-    candidate = adjust(features, scene.map, found, is_sound);
+    candidate = adjust(pair, is_sound);
   found.reject(candidate.adjustment.rejected);
   return candidate;
 }
 
 /// Adjusts a copy of the map with the pair in it.
-VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjust(const StereoFeatures& features, const LocalMap& before,
-                                                             const MotionHypothesis& found, bool may_recall) {
+VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjust(const PairSearch& pair, bool may_recall) {
+  const StereoFeatures& features = pair.features();
+  const MotionHypothesis& found = pair.found();
+  const LocalMap& before = pair.scene()->map;
   const Eigen::Isometry3d T_previous_origin = before.newestPose();
   state_.candidate = before;
   LocalMap& map = *state_.candidate;
@@ -708,8 +428,9 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjust(const StereoFeature
 
 /// Adds second moments to the covariances: of rivals, of places that look alike, and of an unexpected innovation. A
 /// doubtful motion has the moment of its doubt as well.
-void VisualOdometry::Impl::widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief,
-                                 Step& step) {
+void VisualOdometry::Impl::widen(const PairSearch& pair, const Belief& belief, Step& step) {
+  const MotionScene& scene = *pair.scene();
+  const MotionHypothesis& found = pair.found();
   const auto add = [&](const Matrix6d& motion, const Matrix6d& pose) {
     step.covariance += motion;
     state_.covariance.doubt(motion, pose);
@@ -723,9 +444,11 @@ void VisualOdometry::Impl::widen(const MotionScene& scene, const MotionHypothesi
 }
 
 /// Reason, if a motion has too small a probability or too large a covariance; else empty.
-std::string VisualOdometry::Impl::doubtWords(const MotionScene& scene, const MotionHypothesis& found,
-                                             const Candidate& candidate, const Belief& belief) const {
+std::string VisualOdometry::Impl::doubtWords(const PairSearch& pair, const Candidate& candidate,
+                                             const Belief& belief) const {
   if (isDoubtful(belief)) return belief.reason;
+  const MotionScene& scene = *pair.scene();
+  const MotionHypothesis& found = pair.found();
   Matrix6d covariance = candidate.adjustment.since_keyframe + unexpected(scene, found);
   if (scene.place) covariance += scene.place->moment;
   const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
@@ -785,6 +508,44 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::measure(const MotionHypothesis&
          << step.correction.tail<3>().norm() << " rad";
   step.reason = reason.str();
   return step;
+}
+
+/// Widens covariances by the error of the pair's velocity, and keeps the pair until the next motion is known.
+void VisualOdometry::Impl::rememberRolled(PairSearch& pair, Step& step) {
+  const auto ends_with_it = [&](const std::optional<LocalMap>& map) {
+    return map && map->newestStamp() == pair.features().stamp;
+  };
+  if (!pair.rolled() || (!ends_with_it(state_.map) && !ends_with_it(state_.seed))) return;
+  RolledPair& rolled = *pair.rolled();
+  if (!pair.found().motion.success || !step.T_previous_current) {
+    rolled.forgetMotion();
+  } else {
+    const Matrix6d moment = state_.shutter.momentOf(rolled);
+    step.covariance += moment;
+    state_.covariance.doubt(moment, moment);
+  }
+  if (state_.newest && rolled.mean) state_.shutter.learn(*state_.newest, *rolled.mean);
+  state_.newest = std::move(pair.rolled());
+}
+
+/// Updates the state by the pair's step.
+void VisualOdometry::Impl::finish(const PairSearch& pair, Step& step) {
+  const StereoFeatures& features = pair.features();
+  state_.doubt.fade();
+  const auto stood = [&step] {
+    const Vector6d motion = logSE3(*step.T_previous_current);
+    return mahalanobisSquare(motion, step.covariance) < noiseGate(6);
+  };
+  state_.images.remember(pair.whole(), step.state == TrackingState::kTracking && step.T_previous_current && stood());
+  state_.frozen = pair.kind() == PairSearch::kFrozen;
+  if (pair.repeatsAPart() && step.reason.empty())
+    step.reason = "a part of the left image repeats that of the previous pair";
+  const bool since_pose = step.T_previous_current && state_.last_pose_stamp;
+  step.dt = since_pose ? static_cast<double>(features.stamp - *state_.last_pose_stamp) * 1e-9 : pair.dt();
+  if (step.T_previous_current) state_.move(*step.T_previous_current);
+  if (!step.hasPose()) return;
+  state_.last_pose_stamp = features.stamp;
+  state_.outage.havePose();
 }
 
 std::optional<Floor> VisualOdometry::Impl::floor() const {

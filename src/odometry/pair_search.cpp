@@ -1,0 +1,241 @@
+#include "pair_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace sdvo {
+
+SearchTools::SearchTools(const VisualOdometryOptions& options)
+    : motions(FeatureMatcherOptions(), options.motion, alignmentWith(options.noise)),
+      places(FeatureMatcherOptions(), options.motion) {}
+
+double largestDoubt(const TrackingOptions& tracking) {
+  return logOdds(1.0 - tracking.probability);
+}
+
+PairSearch::PairSearch(const VisualOdometryOptions& options, const SearchTools& tools, const OdometryState& state,
+                       const StereoFeatures& given, const std::optional<MotionGuess>& guess)
+    : options_(options), tools_(tools), state_(state), given_(given), guess_(guess) {
+  // A focusing lens changes the camera with every pair, but the pixels of a map are of one camera.
+  if (state.camera && *state.camera != given.camera && state.camera->isLike(given.camera))
+    refocused_ = given.seenBy(*state.camera);
+  if (state.last_stamp) dt_ = static_cast<double>(given.stamp - *state.last_stamp) * 1e-9;
+  new_features_ = state.images.newFeatures(whole(), state.rig.noise.sameMotion(), expectedMotion(guess));
+  if (static_cast<int>(new_features_.size()) < given.count()) new_part_ = whole().select(new_features_);
+  if (!state.map || !state.map->continuedBy(taken()))
+    kind_ = kFirst;
+  else if (state.interrupted)
+    kind_ = kSought;
+  else if ((frozen_ = logOddsOfFrozen()) >= kCertain)
+    kind_ = kFrozen;
+  else
+    kind_ = kFollowed;
+  compensate();
+  findRotated();
+}
+
+/// Expected motion since the previous pair: the guess, else the prediction.
+std::optional<Eigen::Isometry3d> PairSearch::expectedMotion(const std::optional<MotionGuess>& guess) const {
+  if (guess) return motionBy(*guess, state_.prior, dt_);
+  if (state_.interrupted || !state_.prior.velocity() || dt_ > options_.tracking.max_gap) return std::nullopt;
+  return state_.prior.predicted(dt_).motion;
+}
+
+/// Log-odds that images repeat although the camera moved. The guess, or the last motion, implies whether it did. A
+/// robot may stop from one pair to the next as far as the prior allows; the first repeated pair decides.
+double PairSearch::logOddsOfFrozen() const {
+  const StereoFeatures& features = taken();
+  const RepeatedImages& images = state_.images;
+  if (!images.repeat(features)) return kUnsuspected;
+  const auto moved = [&](const Eigen::Isometry3d& T_previous_current) {
+    return RepeatedImages::shouldHaveMoved(features, state_.rig.noise.sameMotion(), T_previous_current);
+  };
+  if (guess_ && !guess_->rotation_only) return moved(guess_->T_previous_current) ? kCertain : kUnsuspected;
+  if (state_.frozen) return kCertain;
+  Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
+  if (guess_) turn.linear() = guess_->T_previous_current.linear();
+  if (moved(turn)) return kCertain;
+  const auto prior = state_.prior.confirmed(*state_.last_stamp, dt_);
+  const auto expected = expectedMotion(std::nullopt);
+  if (!prior || !moved(expected.value_or(prior->motion))) return kUnsuspected;
+  if (images.comeTwice()) return kCertain;
+  if (images.inARow() > 0 && images.logOddsOfOld() < kCertain) return kUnsuspected;
+  const double stop = 0.5 * prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero());
+  return std::min(images.logOddsOfOld() + std::min(stop, -std::log(kTailProbability)), kCertain);
+}
+
+/// Features as of a right camera that did not rotate and is synchronous.
+void PairSearch::compensate() {
+  const LearntRig& rig = state_.rig;
+  const bool is_new = rotation_.log_odds > 0.0;
+  const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + rotation_.value) : rig.rotation;
+  rotated_back_.reset();
+  if (!rotation.isZero()) rotated_back_ = rotatedBack(part(), rotation);
+  const bool has_map = kind_ == kFollowed || kind_ == kSought;
+  const bool is_predicted = has_map && state_.prior.velocity() && dt_ <= options_.tracking.max_gap;
+  if (is_predicted) synchronised_ = synchronised(*state_.prior.velocity());
+  roll(is_predicted ? *state_.prior.velocity() : Vector6d::Zero());
+}
+
+/// The features at the time of the left image; none if no delay is known.
+std::optional<StereoFeatures> PairSearch::synchronised(const Vector6d& velocity) const {
+  const double known = state_.rig.calibration.delay();
+  if (taken().right_delay + known == 0.0) return std::nullopt;
+  return state_.rig.right_delay.synchronised(taken(), dt_, velocity, known);
+}
+
+/// Moves all rows to the stamp, by the velocity of the camera there.
+void PairSearch::roll(const Vector6d& velocity) {
+  if (!state_.shutter.isRolling()) return;
+  rolled_ = RolledPair{inStep(), velocity};
+  global_ = state_.shutter.asGlobal(*rolled_);
+}
+
+/// Moves rows of the pair, and of the map's newest one, by the velocities that the pair's motion implies. False if they
+/// are moved so already.
+bool PairSearch::rollAgain() {
+  const RollingShutter& shutter = state_.shutter;
+  const auto changes = [&](RolledPair& rolled, const Vector6d& velocity) {
+    if (shutter.isNegligible(rolled.features.camera, velocity - rolled.velocity)) return false;
+    rolled.velocity = velocity;
+    return true;
+  };
+  RolledPair& now = *rolled_;
+  now.forgetMotion();
+  now.rate_by_rows = shutter.rateByRows(now, found_);
+  bool has_changed = false;
+  if (kind_ == kFollowed) {
+    const Eigen::Isometry3d motion = found_.motion.T_current_reference.inverse();
+    now.dt = state_.prior.interval(state_.map->secondsUntil(now.features), motion);
+    now.mean = logSE3(motion) / now.dt;
+    if (state_.newest && state_.newest->features.stamp == state_.map->newestStamp()) {
+      const RolledPair& newest = *state_.newest;
+      now.mean_before = newest.mean;
+      if (!newest_) newest_ = newest;
+      if (changes(*newest_, shutter.velocityBetween(newest, *now.mean))) {
+        has_changed = true;
+        map_ = state_.map;
+        map_->moveNewest(shutter.asGlobal(newest), shutter.asGlobal(*newest_), state_.rig.calibration.calibration());
+      }
+    }
+  }
+  if (changes(now, shutter.velocityAt(now))) {
+    has_changed = true;
+    global_ = shutter.asGlobal(now);
+  }
+  return has_changed;
+}
+
+/// Searches in the map, after an outage also in the seed. Returns the camera's velocity; zero if nothing is found.
+Vector6d PairSearch::find() {
+  scene_.reset();
+  if (kind_ == kFollowed) scene_.emplace(sceneOf(map_ ? *map_ : *state_.map, dt_, guess_));
+  if (kind_ == kSought)
+    if (auto place = reacquired()) scene_.emplace(std::move(*place));
+  found_ = scene_ ? tools_.motions.find(*scene_, largestDoubt(options_.tracking)) : MotionHypothesis();
+  if (!found_.motion.success) return Vector6d::Zero();
+  const Eigen::Isometry3d motion = found_.motion.T_current_reference.inverse();
+  return logSE3(motion) / state_.prior.interval(scene_->map.secondsUntil(features()), motion);
+}
+
+/// If the camera turns otherwise than expected, the delay is compensated again.
+Vector6d PairSearch::findSynchronised() {
+  constexpr double kNegligible = 0.02;  // px (chosen): a fifth of a disparity's noise
+  const Vector6d velocity = find();
+  if (kind_ != kFollowed || !synchronised_ || !found_.motion.success) return velocity;
+  const double delay = taken().right_delay + state_.rig.calibration.delay();
+  const double unexpected = (velocity - *state_.prior.velocity()).tail<3>().norm();
+  if (std::abs(delay) * given_.camera.fx * unexpected < kNegligible) return velocity;
+  synchronised_ = synchronised(velocity);
+  roll(velocity);
+  return find();
+}
+
+/// The same with rows that are moved by the velocity that is found.
+Vector6d PairSearch::findGlobal() {
+  constexpr int kPasses = 3;  // at most; each leaves some hundredths of the velocity's error
+  Vector6d velocity = findSynchronised();
+  for (int pass = 0; pass < kPasses && rolled_ && found_.motion.success && rollAgain(); ++pass) velocity = find();
+  return velocity;
+}
+
+/// Rotation of the right camera, with a `supposed` one that is compensated already, rad.
+ShownRotation PairSearch::shownBeyond(const Eigen::Vector3d& supposed) {
+  const Vector6d velocity = findGlobal();
+  const Eigen::Vector3d turn = dt_ * velocity.tail<3>();
+  const Eigen::Vector3d before = dt_ * state_.prior.velocity().value_or(Vector6d::Zero()).tail<3>();
+  const Eigen::Matrix3d turns = turn * turn.transpose() + before * before.transpose();
+  return state_.rig.shownRotation(features(), found_, supposed, turns, dt_);
+}
+
+void PairSearch::compensateFor(const ShownRotation& rotation) {
+  rotation_ = rotation;
+  compensate();
+}
+
+/// If the right camera seems to have rotated, features are compensated again and the search is repeated. Without a
+/// motion of most matches, a yaw of the right camera is tried; it is kept if more matches agree.
+void PairSearch::findRotated() {
+  rotation_ = shownBeyond(Eigen::Vector3d::Zero());
+  if (kind_ == kFollowed && scene_->T_current_reference && !found_.isOfMajority()) {
+    // After a knock beyond the matches' noise no motion explains both views, but the left one alone may be explained.
+    const ShownRotation at_first = rotation_;
+    const int inliers = found_.agreement.inliers;
+    const Eigen::Vector3d yaw = yawByDisparities(given_.camera, found_.correspondences, *scene_->T_current_reference);
+    compensateFor({yaw, Eigen::Matrix3d::Zero(), kCertain, kUnsuspected});
+    rotation_ = shownBeyond(yaw);
+    if (!found_.motion.success || found_.agreement.inliers <= inliers || !(rotation_.log_odds > 0.0))
+      compensateFor(at_first), findGlobal();
+  }
+  if (!(rotation_.log_odds > 0.0)) return;
+  compensate();
+  findGlobal();
+}
+
+/// The map, the pair, and the expected motion between them: that of predicted pairs since the reference, then the
+/// velocity or the guess.
+MotionScene PairSearch::sceneOf(const LocalMap& map, double dt, const std::optional<MotionGuess>& guess) const {
+  const MotionPrior& prior = state_.prior;
+  MotionScene scene{map,
+                    state_.rig.calibration.calibration(),
+                    features(),
+                    {},
+                    {},
+                    {},
+                    state_.doubt.lasts(),
+                    state_.doubt.logOdds() > largestDoubt(options_.tracking),
+                    options_.tracking.doubtful_deviation,
+                    state_.rig.noise};
+  const Eigen::Isometry3d T_reference_previous = map.newestPose() * state_.T_origin_camera;
+  const double since = map.secondsUntil(features());
+  if (const auto confirmed = prior.confirmed(map.newestStamp(), since)) scene.prior.push_back(*confirmed);
+  if (prior.velocity() && dt <= options_.tracking.max_gap)
+    scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
+  if (guess) {
+    scene.guess = (T_reference_previous * motionBy(*guess, prior, dt)).inverse();
+    if (!scene.prior.empty()) scene.prior.push_back(prior.around(scene.guess->inverse(), since));
+  }
+  return scene;
+}
+
+/// Where the pair is in the map from before an outage, in the one before that, then in the seed. The camera's motion
+/// meanwhile is unknown.
+std::optional<MotionScene> PairSearch::reacquired() const {
+  std::optional<MotionScene> scene;
+  for (const LocalMap* map : {&*state_.map, state_.left ? &state_.left->map : nullptr}) {
+    if (!map || !map->continuedBy(features())) continue;
+    const auto place = tools_.places.find(*map, features(), state_.rig.calibration.calibration());
+    const double since = map->secondsUntil(features());
+    if (!place || !state_.prior.tooFast(place->T_current_newest.inverse(), Matrix6d::Zero(), since).empty()) continue;
+    scene.emplace(sceneOf(*map, 0.0, std::nullopt));
+    scene->place = weigh(*place, scene->prior);
+    scene->T_current_reference = scene->place->T_current_newest;
+    scene->prior.clear();
+    return scene;
+  }
+  if (state_.seed) scene.emplace(sceneOf(*state_.seed, 0.0, std::nullopt));
+  return scene;
+}
+
+}  // namespace sdvo

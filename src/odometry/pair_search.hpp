@@ -1,0 +1,101 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <vector>
+
+#include "../belief/motion_search.hpp"
+#include "../map/reacquisition.hpp"
+#include "odometry_state.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/motion_guess.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
+
+namespace sdvo {
+
+/// What a pair's search uses besides the state.
+struct SearchTools {
+  explicit SearchTools(const VisualOdometryOptions& options);
+
+  MotionSearch motions;
+  Reacquisition places;
+};
+
+/// Log-odds that a motion is not the camera's, above which it is doubtful.
+double largestDoubt(const TrackingOptions& tracking);
+
+/// The search of one pair's motion: in the map's camera, without repeated rows, with the right image rotated back and
+/// synchronous, all rows of one moment. The state does not change; state and features must outlive the search.
+class PairSearch {
+ public:
+  PairSearch(const VisualOdometryOptions& options, const SearchTools& tools, const OdometryState& state,
+             const StereoFeatures& given, const std::optional<MotionGuess>& guess);
+  PairSearch(const PairSearch&) = delete;  // its parts refer to each other
+  PairSearch& operator=(const PairSearch&) = delete;
+
+  /// Without a map of its camera; after an outage; with repeated images; after a pose.
+  enum Kind { kFirst, kSought, kFrozen, kFollowed };
+  Kind kind() const { return kind_; }
+
+  double dt() const { return dt_; }          ///< since the previous pair, s
+  double frozen() const { return frozen_; }  ///< log-odds that its images repeat although the camera moved
+
+  /// All features in the map's camera.
+  const StereoFeatures& whole() const { return refocused_ ? *refocused_ : given_; }
+  /// Those that do not repeat the previous pair's, of a right camera that did not rotate.
+  const StereoFeatures& taken() const { return rotated_back_ ? *rotated_back_ : part(); }
+  /// Those that the motion is found with.
+  const StereoFeatures& features() const { return global_ ? *global_ : inStep(); }
+  /// For each of features() its index in the pair as given.
+  const std::vector<int>& givenIndices() const { return new_features_; }
+  bool repeatsAPart() const { return new_part_.has_value(); }
+
+  /// New rotation of the right camera, for which features are compensated if it is likely.
+  const ShownRotation& rotation() const { return rotation_; }
+  /// The pair before its rows were moved to the stamp; only with a rolling shutter.
+  std::optional<RolledPair>& rolled() { return rolled_; }
+
+  /// Where the motion is searched; none for a first pair or a frozen one.
+  const std::optional<MotionScene>& scene() const { return scene_; }
+  const MotionHypothesis& found() const { return found_; }
+  MotionHypothesis& found() { return found_; }
+
+ private:
+  const StereoFeatures& part() const { return new_part_ ? *new_part_ : whole(); }
+  const StereoFeatures& inStep() const { return synchronised_ ? *synchronised_ : taken(); }
+
+  std::optional<Eigen::Isometry3d> expectedMotion(const std::optional<MotionGuess>& guess) const;
+  double logOddsOfFrozen() const;
+  void compensate();
+  std::optional<StereoFeatures> synchronised(const Vector6d& velocity) const;
+  void roll(const Vector6d& velocity);
+  bool rollAgain();
+  Vector6d find();
+  Vector6d findSynchronised();
+  Vector6d findGlobal();
+  ShownRotation shownBeyond(const Eigen::Vector3d& supposed);
+  void compensateFor(const ShownRotation& rotation);
+  void findRotated();
+  MotionScene sceneOf(const LocalMap& map, double dt, const std::optional<MotionGuess>& guess) const;
+  std::optional<MotionScene> reacquired() const;
+
+  const VisualOdometryOptions& options_;
+  const SearchTools& tools_;
+  const OdometryState& state_;
+  const StereoFeatures& given_;
+  const std::optional<MotionGuess>& guess_;
+  Kind kind_ = kFirst;
+  double dt_ = 0.0;
+  double frozen_ = kUnsuspected;
+  std::vector<int> new_features_;
+  std::optional<StereoFeatures> refocused_, new_part_, rotated_back_, synchronised_;
+  std::optional<RolledPair> rolled_;      // only with a rolling shutter, as the next three
+  std::optional<StereoFeatures> global_;  // rows moved to the stamp
+  std::optional<RolledPair> newest_;      // of the map, with its velocity since the pair's motion is known
+  std::optional<LocalMap> map_;           // with this velocity
+  ShownRotation rotation_;
+  std::optional<MotionScene> scene_;
+  MotionHypothesis found_;
+};
+
+}  // namespace sdvo
