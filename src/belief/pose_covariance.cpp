@@ -1,5 +1,6 @@
 #include "pose_covariance.hpp"
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "../motion/noise.hpp"
@@ -54,6 +55,26 @@ Matrix6d PoseCovariance::expose(const RigEstimate::MotionJacobian& since_keyfram
   exposure_.leftCols<RigEstimate::kParameters>() += since_keyframe;
   exposure_.rightCols<1>() -= since_keyframe * compensated;
   return momentOf(exposure_ - before, known);
+}
+
+void PoseCovariance::walkRig(const RigEstimate& known, const RigEstimate::Matrix& step) {
+  if (step.isZero()) return;  // what is certain of the rig has no inverse then
+  regress(known, known.covariance * (known.covariance + step).inverse());
+}
+
+/// Expresses poses by the rig after a step: the rig before it is known.mean + kept * (rig - known.mean) and a remainder
+/// that the rig does not tell.
+void PoseCovariance::regress(const RigEstimate& known, const RigEstimate::Matrix& kept) {
+  const RigEstimate::Matrix gone = RigEstimate::Matrix::Identity() - kept;
+  const auto express = [&](Exposure& exposure, Matrix6d& covariance) {
+    const RigEstimate::MotionJacobian derivative = exposure.leftCols<RigEstimate::kParameters>();
+    const Matrix6d remainder = derivative * gone * known.covariance * derivative.transpose();
+    covariance += 0.5 * (remainder + remainder.transpose());
+    exposure.rightCols<1>() += derivative * gone * known.mean;
+    exposure.leftCols<RigEstimate::kParameters>() = derivative * kept;
+  };
+  express(exposure_, measured_);
+  express(keyframe_exposure_, keyframe_);
 }
 
 void PoseCovariance::cover(const Vector6d& correction) {

@@ -20,8 +20,9 @@ Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation);
 /// same; its traces of translation and rotation never shrink. Predictions and doubts since the last measurement are the
 /// unmeasured part, which the next measurement replaces. A sum of parts is positive whatever their size.
 ///
-/// The rig's error is common to all motions: unlike noise it adds up with the distance. It is kept apart, as the pose's
-/// derivative by the rig.
+/// The rig's error is common to all motions: unlike noise it adds up with the distance. Pose and rig are one Gaussian
+/// with a cross-covariance (Schmidt 1966: the pose considers what it cannot observe), kept as the rig's distribution,
+/// which CalibrationFilter has, and the pose's given the rig: its derivative by the rig (the exposure) and what remains.
 class PoseCovariance {
  public:
   /// Of the last pose without the rig's error; zero in the beginning.
@@ -69,6 +70,12 @@ class PoseCovariance {
   Matrix6d expose(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate& known,
                   const RigEstimate::Vector& compensated);
 
+  /// The rig walked by a random step of this covariance after it was `known`. Poses depend on the rig before the step,
+  /// which the rig after it tells in part.
+  void walkRig(const RigEstimate& known, const RigEstimate::Matrix& step);
+  /// The rig is another one: it tells nothing of the one that was `known`.
+  void changeRig(const RigEstimate& known) { regress(known, RigEstimate::Matrix::Zero()); }
+
   /// Adds second moments of doubt to the last motion and pose, until the next pose is measured in the map.
   void doubt(const Matrix6d& motion, const Matrix6d& pose);
 
@@ -81,6 +88,7 @@ class PoseCovariance {
 
   static Matrix6d momentOf(const Exposure& exposure, const RigEstimate& known);
   void carry(const Eigen::Isometry3d& T_previous_current);
+  void regress(const RigEstimate& known, const RigEstimate::Matrix& kept);
 
   Matrix6d measured_ = Matrix6d::Zero();    ///< of the last measured pose, in the last pose's frame
   Matrix6d doubted_ = Matrix6d::Zero();     ///< of the pose by predictions and doubts since then

@@ -58,7 +58,14 @@ OdometryState::OdometryState(const VisualOdometryOptions& options, int first_epo
       epoch(first_epoch) {}
 
 void OdometryState::forgetRig(const VisualOdometryOptions& options) {
+  covariance.changeRig(rig.calibration.estimate());
+  if (left) left->covariance.changeRig(rig.calibration.estimate());
   rig = unknownRig(options);
+}
+
+void OdometryState::walkRig(const RigEstimate& known, const RigEstimate::Matrix& step) {
+  covariance.walkRig(known, step);
+  if (left) left->covariance.walkRig(known, step);
 }
 
 void OdometryState::interrupt() {
@@ -71,7 +78,7 @@ void OdometryState::recover(const VisualOdometryOptions& options) {
   fresh.T_origin_camera = sound.T_origin_camera;
   fresh.covariance.assume(sound.pose_covariance);
   fresh.distance = sound.distance;
-  fresh.camera = camera, fresh.last_stamp = last_stamp, fresh.last_pose_stamp = last_pose_stamp;
+  fresh.camera = camera, fresh.lens = lens, fresh.last_stamp = last_stamp, fresh.last_pose_stamp = last_pose_stamp;
   fresh.pairs = pairs, fresh.started = started;
   fresh.sound = std::move(sound);
   *this = std::move(fresh);
@@ -102,6 +109,15 @@ void OdometryState::takeSeed() {
   started = true;
   interrupted = false;
   outage.end();
+}
+
+void OdometryState::recalibrate(const VisualOdometryOptions& options, const StereoFeatures& given) {
+  forgetRig(options);
+  covariance.beginMap();
+  map.emplace(options.map);
+  map->insert(alignmentWith(options.noise), given, pairs, T_origin_camera.inverse(), {}, rig.calibration.calibration());
+  camera = lens = given.camera;
+  lens_stamp = given.stamp;
 }
 
 void OdometryState::move(const Eigen::Isometry3d& T_previous_current) {

@@ -73,7 +73,9 @@ struct OdometryState {
   Outage outage;
   RepeatedImages images;
   FloorBelief floor;
-  std::optional<StereoCamera> camera;
+  std::optional<StereoCamera> camera;      ///< of the map's pixels
+  std::optional<std::int64_t> lens_stamp;  ///< ns, of the last pair whose camera_info was not refuted
+  std::optional<StereoCamera> lens;        ///< of the last pair's pixels: as camera_info said, unless images refuted it
   std::optional<std::int64_t> last_stamp;
   Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
   PoseCovariance covariance;                    ///< of that pose
@@ -90,6 +92,8 @@ struct OdometryState {
 
   /// The estimates of the rig start anew.
   void forgetRig(const VisualOdometryOptions& options);
+  /// The rig walked by a random step after it was `known`.
+  void walkRig(const RigEstimate& known, const RigEstimate::Matrix& step);
 
   /// The next pair does not continue the last one.
   void interrupt();
@@ -106,6 +110,9 @@ struct OdometryState {
   void forgetMaps() { map.reset(), left.reset(); }
   /// The seed becomes the map.
   void takeSeed();
+
+  /// The pair's calibration is new: a map begins with it at the last pose, and the rig's estimates start anew.
+  void recalibrate(const VisualOdometryOptions& options, const StereoFeatures& given);
 
   void move(const Eigen::Isometry3d& T_previous_current);
 

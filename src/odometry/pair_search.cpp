@@ -17,15 +17,22 @@ double largestDoubt(const TrackingOptions& tracking) {
 PairSearch::PairSearch(const VisualOdometryOptions& options, const SearchTools& tools, const OdometryState& state,
                        const StereoFeatures& given, const std::optional<MotionGuess>& guess)
     : options_(options), tools_(tools), state_(state), given_(given), guess_(guess) {
-  // A focusing lens changes the camera with every pair, but the pixels of a map are of one camera.
-  if (state.camera && *state.camera != given.camera && state.camera->isLike(given.camera))
-    refocused_ = given.seenBy(*state.camera);
   if (state.last_stamp) dt_ = static_cast<double>(given.stamp - *state.last_stamp) * 1e-9;
-  new_features_ = state.images.newFeatures(whole(), state.rig.noise.sameMotion(), expectedMotion(guess));
-  if (static_cast<int>(new_features_.size()) < given.count()) new_part_ = whole().select(new_features_);
-  if (!state.map || !state.map->continuedBy(taken()))
+  searchBy(given.camera);
+  if (kind_ != kFollowed || !state.lens || !state.lens->isLike(given.camera) || !movesFeatures(*state.lens)) return;
+  // Either the lens moved, or camera_info changed without it: a fault of the driver, or a new calibration.
+  const double by_given = logLikelihood();
+  searchBy(*state.lens);
+  const double ratio = (logLikelihood() - by_given) / state.rig.noise.shared();
+  if (!(kUnsuspected + ratio > 0.0)) searchBy(given.camera);
+}
+
+/// Searches with pixels of this camera.
+void PairSearch::searchBy(const StereoCamera& lens) {
+  take(lens);
+  if (!state_.map || !state_.map->continuedBy(taken()))
     kind_ = kFirst;
-  else if (state.interrupted)
+  else if (state_.interrupted)
     kind_ = kSought;
   else if ((frozen_ = logOddsOfFrozen()) >= kCertain)
     kind_ = kFrozen;
@@ -33,6 +40,52 @@ PairSearch::PairSearch(const VisualOdometryOptions& options, const SearchTools& 
     kind_ = kFollowed;
   compensate();
   findRotated();
+}
+
+/// The features as the map's camera sees them, without those that repeat the previous pair's. A focusing lens changes
+/// the camera with every pair, but the pixels of a map are of one camera.
+void PairSearch::take(const StereoCamera& lens) {
+  lens_ = lens;
+  refocused_.reset(), new_part_.reset(), rotated_back_.reset(), synchronised_.reset();
+  newest_.reset(), map_.reset();
+  rotation_ = ShownRotation();
+  if (lens != given_.camera) refocused_ = given_, refocused_->camera = lens;
+  if (state_.camera && *state_.camera != lens && state_.camera->isLike(lens))
+    refocused_ = whole().seenBy(*state_.camera);
+  new_features_ = state_.images.newFeatures(whole(), state_.rig.noise.sameMotion(), expectedMotion(guess_));
+  if (static_cast<int>(new_features_.size()) < given_.count()) new_part_ = whole().select(new_features_);
+}
+
+/// Whether the change from the camera before moves a feature by more than the noise of corners.
+bool PairSearch::movesFeatures(const StereoCamera& before) const {
+  if (before == given_.camera) return false;
+  const StereoFeatures seen = given_.seenBy(before);
+  for (int i = 0; i < seen.count(); ++i)
+    if (std::hypot(seen.u[i] - given_.u[i], seen.v[i] - given_.v[i], seen.disparity[i] - given_.disparity[i]) >
+        options_.noise.corner)
+      return true;
+  return false;
+}
+
+/// Of the motion that is found, by its inliers' aligned positions, up to a constant. The map's points err as much as
+/// the pair's; a wrong match costs the gate.
+double PairSearch::logLikelihood() const {
+  const StereoCamera& camera = features().camera;
+  const NoiseOptions& noise = options_.noise;
+  const double disparity_variance = std::pow(noise.disparity, 2) + std::pow(noise.common_disparity, 2);
+  double explained = 0.0;
+  for (std::size_t k = 0; k < found_.sightings.size(); ++k) {
+    const LocalMap::Sighting& sighting = found_.sightings[k];
+    const int reference = found_.matches[static_cast<std::size_t>(found_.motion.inliers[k])].reference;
+    const Eigen::Vector3d point = found_.motion.T_current_reference * found_.view->points.positions[reference];
+    const Eigen::Vector2d left = camera.project(point).head<2>();
+    const double disparity =
+        camera.disparity(point.z()) + scene_->calibration.disparityError(camera, left.x(), left.y());
+    const double square = (sighting.measurement.head<2>() - left).squaredNorm() / std::pow(sighting.sigma, 2) +
+                          std::pow(sighting.measurement.z() - disparity, 2) / disparity_variance;
+    explained += std::max(noiseGate(3) - 0.5 * square, 0.0);
+  }
+  return 0.5 * explained;
 }
 
 /// Expected motion since the previous pair: the guess, else the prediction.

@@ -40,6 +40,7 @@ class PairSearch {
   double dt() const { return dt_; }          ///< since the previous pair, s
   double frozen() const { return frozen_; }  ///< log-odds that its images repeat although the camera moved
 
+  const StereoFeatures& given() const { return given_; }
   /// All features in the map's camera.
   const StereoFeatures& whole() const { return refocused_ ? *refocused_ : given_; }
   /// Those that do not repeat the previous pair's, of a right camera that did not rotate.
@@ -49,6 +50,9 @@ class PairSearch {
   /// For each of features() its index in the pair as given.
   const std::vector<int>& givenIndices() const { return new_features_; }
   bool repeatsAPart() const { return new_part_.has_value(); }
+  /// The camera whose pixels these are: the pair's, or that of the pair before if the images refute a change.
+  const StereoCamera& lens() const { return lens_; }
+  bool refutesCamera() const { return lens_ != given_.camera; }
 
   /// New rotation of the right camera, for which features are compensated if it is likely.
   const ShownRotation& rotation() const { return rotation_; }
@@ -64,6 +68,10 @@ class PairSearch {
   const StereoFeatures& part() const { return new_part_ ? *new_part_ : whole(); }
   const StereoFeatures& inStep() const { return synchronised_ ? *synchronised_ : taken(); }
 
+  void take(const StereoCamera& lens);
+  void searchBy(const StereoCamera& lens);
+  bool movesFeatures(const StereoCamera& before) const;
+  double logLikelihood() const;
   std::optional<Eigen::Isometry3d> expectedMotion(const std::optional<MotionGuess>& guess) const;
   double logOddsOfFrozen() const;
   void compensate();
@@ -84,6 +92,7 @@ class PairSearch {
   const OdometryState& state_;
   const StereoFeatures& given_;
   const std::optional<MotionGuess>& guess_;
+  StereoCamera lens_;
   Kind kind_ = kFirst;
   double dt_ = 0.0;
   double frozen_ = kUnsuspected;

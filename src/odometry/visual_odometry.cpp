@@ -285,12 +285,17 @@ void VisualOdometry::Impl::begin(const PairSearch& pair, const std::optional<Mot
   const StereoFeatures& features = pair.features();
   if (state_.camera && *state_.camera != features.camera) state_.forgetRig(options_);
   state_.camera = features.camera;
+  state_.lens = pair.lens();
+  if (!pair.refutesCamera()) state_.lens_stamp = features.stamp;
   state_.last_stamp = features.stamp;
   ++state_.pairs;
   if (pair.dt() <= options_.tracking.max_gap) state_.prior.noteInterval(pair.dt());
   state_.outage.extend(pair.dt(), guess, state_.prior);
-  state_.rig.calibration.predict(std::min(pair.dt(), options_.tracking.max_gap));  // a clock's jump ages no rig
-  if (pair.rotation().log_odds > 0.0) state_.rig.rotate(pair.rotation(), features.camera);
+  const RigEstimate before = state_.rig.calibration.estimate();
+  // A clock's jump ages no rig.
+  RigEstimate::Matrix step = state_.rig.calibration.predict(std::min(pair.dt(), options_.tracking.max_gap));
+  if (pair.rotation().log_odds > 0.0) step += state_.rig.rotate(pair.rotation(), features.camera);
+  state_.walkRig(before, step);
 }
 
 /// Whether the pair joins the map: its motion may be refused before or after the adjustment.
@@ -540,12 +545,18 @@ void VisualOdometry::Impl::finish(const PairSearch& pair, Step& step) {
   state_.frozen = pair.kind() == PairSearch::kFrozen;
   if (pair.repeatsAPart() && step.reason.empty())
     step.reason = "a part of the left image repeats that of the previous pair";
+  if (pair.refutesCamera() && step.reason.empty())
+    step.reason = "camera_info changed, but the images did not: the calibration before it is used";
   const bool since_pose = step.T_previous_current && state_.last_pose_stamp;
   step.dt = since_pose ? static_cast<double>(features.stamp - *state_.last_pose_stamp) * 1e-9 : pair.dt();
   if (step.T_previous_current) state_.move(*step.T_previous_current);
   if (!step.hasPose()) return;
   state_.last_pose_stamp = features.stamp;
   state_.outage.havePose();
+  // A driver's fault is short.
+  if (pair.refutesCamera() &&
+      static_cast<double>(features.stamp - *state_.lens_stamp) * 1e-9 > options_.tracking.max_gap)
+    state_.recalibrate(options_, pair.given());
 }
 
 std::optional<Floor> VisualOdometry::Impl::floor() const {

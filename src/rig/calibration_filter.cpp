@@ -129,22 +129,23 @@ void CalibrationFilter::noteRows(int parameter, double value, double sigma) {
   rows_[parameter] = value;
 }
 
-void CalibrationFilter::predict(double dt) {
-  widen(diagonal(kWarming * kWarming * dt, kRolling * kRolling * dt, kClocks * kClocks * dt));
+Matrix CalibrationFilter::predict(double dt) {
+  return widen(diagonal(kWarming * kWarming * dt, kRolling * kRolling * dt, kClocks * kClocks * dt));
 }
 
-void CalibrationFilter::widen(const StereoCamera& camera, const Eigen::Matrix3d& rotation) {
+Matrix CalibrationFilter::widen(const StereoCamera& camera, const Eigen::Matrix3d& rotation) {
   const auto by_rotation = RigEstimate::byRotation(camera);
-  widen(by_rotation * rotation * by_rotation.transpose());
+  return widen(by_rotation * rotation * by_rotation.transpose());
 }
 
-void CalibrationFilter::widen(const Matrix& covariance) {
+Matrix CalibrationFilter::widen(const Matrix& covariance) {
   const auto widened = [&](Likelihood& known) {
     const Matrix less = (Matrix::Identity() + known.information * covariance).inverse();
     known = {less * known.information, less * known.information_mean};
   };
   widened(past_), widened(pending_);
   if (present_) widened(*present_);
+  return covariance;
 }
 
 }  // namespace sdvo

@@ -22,8 +22,8 @@ class CalibrationFilter {
 
   explicit CalibrationFilter(const CalibrationOptions& options);
 
-  /// Adds the process noise of `dt` s: the rig warms up or cools down, and its cameras' clocks drift.
-  void predict(double dt);
+  /// Adds the process noise of `dt` s, and returns it: the rig warms up or cools down, and its cameras' clocks drift.
+  RigEstimate::Matrix predict(double dt);
 
   /// Calibration before a window's adjustment: estimate(), which has the window up to its last pair. Without it, a rig
   /// without error keeps half of the options' prior for as long as one key frame stays, and the window follows noise.
@@ -43,8 +43,9 @@ class CalibrationFilter {
   /// Averages the variance, px^2, of the disparity error that all sightings of a point share, as a window estimates it.
   void noteCommon(double square);
 
-  /// The right camera rotated, and features are rotated back. Adds the covariance of this rotation, rad^2.
-  void widen(const StereoCamera& camera, const Eigen::Matrix3d& rotation);
+  /// The right camera rotated, and features are rotated back. Adds the covariance of this rotation, rad^2, and returns it
+  /// as the rig's.
+  RigEstimate::Matrix widen(const StereoCamera& camera, const Eigen::Matrix3d& rotation);
 
   /// Result of the last window, px.
   const RigCalibration& calibration() const { return calibration_; }
@@ -67,7 +68,7 @@ class CalibrationFilter {
 
   const Likelihood& pastBefore(int oldest_id) const;
   RigEstimate weigh(const Likelihood& windows) const;
-  void widen(const RigEstimate::Matrix& covariance);
+  RigEstimate::Matrix widen(const RigEstimate::Matrix& covariance);
 
   CalibrationOptions options_;
   RigCalibration calibration_;

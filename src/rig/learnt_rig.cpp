@@ -83,17 +83,17 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   return shown;
 }
 
-void LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
+RigEstimate::Matrix LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
   const Eigen::Vector3d now = rotation + shown.value, back = now - rotation_before_;
   const Eigen::Matrix3d covariance = rotation_covariance + shown.covariance;
   std::swap(rotation, rotation_before_), std::swap(rotation_covariance, covariance_before_);
   if (back.dot((covariance + rotation_covariance).inverse() * back) < noiseGate(3)) {
     // The rig is again as before the last rotation: an error of images, no knock.
     rotation_noise_ += shown.value * shown.value.transpose();
-    return;
+    return RigEstimate::Matrix::Zero();
   }
   rotation = now, rotation_covariance = covariance;
-  calibration.widen(camera, shown.covariance);
+  return calibration.widen(camera, shown.covariance);
 }
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,

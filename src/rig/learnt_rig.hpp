@@ -54,8 +54,9 @@ struct LearntRig {
   ShownRotation shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
                               const Eigen::Vector3d& supposed, const Eigen::Matrix3d& turns, double dt) const;
 
-  /// Adds a new rotation. A rotation that undoes the last one counts as noise of this rig.
-  void rotate(const ShownRotation& shown, const StereoCamera& camera);
+  /// Adds a new rotation, and returns how uncertain it leaves the rig. A rotation that undoes the last one counts as
+  /// noise of this rig.
+  RigEstimate::Matrix rotate(const ShownRotation& shown, const StereoCamera& camera);
 
   /// Learns from a pair. Refused pairs raise the odds of right images of other moments, unconfirmed ones interrupt the
   /// delay's pairs. `measured` is null without a motion.

@@ -303,4 +303,39 @@ TEST(PoseCovariance, AMotionHasItsPartOfTheRigsErrorAndAMapThatBeginsKeepsThePos
   EXPECT_NEAR(std::sqrt(covariance.byRig(known)(2, 2)), 14.0 * 0.02 * 0.3, 1e-12);
 }
 
+/// Schmidt's filter in covariance form: a drive whose rig walks, and poses that its mean never corrects.
+TEST(PoseCovariance, IsThatOfOneGaussianOfPoseAndRig) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  const auto drawn = [&](auto matrix) {
+    return decltype(matrix)(matrix.unaryExpr([&](double) { return normal(random); }));
+  };
+  RigEstimate known;
+  known.covariance.diagonal() << 0.09, 0.25, 1e-4, 1e-6;
+  const RigEstimate::Vector step(0.002, 0.001, 1e-6, 1e-8);
+  PoseCovariance covariance;
+  Matrix6d pose = Matrix6d::Zero();
+  Eigen::Matrix<double, 6, RigEstimate::kParameters> cross;
+  cross.setZero();
+  for (int pair = 0; pair < 20; ++pair) {
+    covariance.walkRig(known, RigEstimate::Matrix::Zero());
+    covariance.walkRig(known, step.asDiagonal());
+    known.covariance += step.asDiagonal();
+    const Matrix6d noise = diagonal(1e-4, 1e-6);
+    const RigEstimate::MotionJacobian by_rig = 0.01 * drawn(RigEstimate::MotionJacobian());
+    const Matrix6d ad = adjoint(forward().inverse());
+    pose = (ad * pose * ad.transpose()).eval(), cross = (ad * cross).eval();
+    const Matrix6d mixed = by_rig * cross.transpose();
+    pose += noise + mixed + mixed.transpose() + by_rig * known.covariance * by_rig.transpose();
+    cross += by_rig * known.covariance;
+    covariance.measure(forward(), noise);
+    covariance.expose(by_rig, known, RigEstimate::Vector::Zero());
+    covariance.markKeyframe();
+    EXPECT_LT((covariance.value() + covariance.byRig(known) - pose).norm(), 1e-9 * pose.norm()) << pair;
+  }
+  covariance.changeRig(known);
+  EXPECT_LT((covariance.value() - pose).norm(), 1e-9 * pose.norm()) << "whatever the next rig is";
+  EXPECT_EQ(covariance.byRig(known).norm(), 0.0);
+}
+
 }  // namespace sdvo::test_pose_covariance

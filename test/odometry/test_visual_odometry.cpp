@@ -671,6 +671,42 @@ TEST(VisualOdometry, GoesOnWithALensThatFocuses) {
   }
 }
 
+/// The street's pairs as a driver gives them whose calibration is wrong for some pairs.
+StereoFeatures pairWith(int i, double fx, double cx, double baseline) {
+  StereoFeatures features = pairOf(i);
+  features.camera.fx *= fx, features.camera.fy *= fx, features.camera.cx += cx, features.camera.baseline *= baseline;
+  return features;
+}
+
+TEST(VisualOdometry, ImagesRefuteACameraThatTheyDoNotShow) {
+  for (const auto& [fx, cx, baseline] : std::vector<std::array<double, 3>>{{1.03, 0, 1}, {1, 12, 1}, {1, 0, 1.04}}) {
+    VisualOdometry odometry({});
+    follow(odometry, 8);
+    for (int i = 9; i <= 14; ++i) {
+      const bool is_wrong = i < 12;
+      const OdometryResult result = odometry.update(is_wrong ? pairWith(i, fx, cx, baseline) : pairOf(i));
+      expectState(result, TrackingState::kTracking);
+      EXPECT_EQ(is_wrong, result.reason.find("camera_info") != std::string::npos) << i << ": " << result.reason;
+      EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 5e-3) << i;
+    }
+  }
+}
+
+TEST(VisualOdometry, ACalibrationThatLastsIsTaken) {
+  VisualOdometry odometry({});
+  OdometryResult last = follow(odometry, 8);
+  const int taken = 8 + static_cast<int>(1e9 * odometry.options().tracking.max_gap / kPeriod) + 1;
+  for (int i = 9; i <= taken + 5; ++i) {
+    const OdometryResult result = odometry.update(pairWith(i, 1.0, 0.0, 1.04));
+    expectState(result, TrackingState::kTracking);
+    EXPECT_EQ(result.epoch, last.epoch);
+    EXPECT_EQ(i <= taken, result.reason.find("camera_info") != std::string::npos) << i << ": " << result.reason;
+    const double scale = i <= taken ? 1.0 : 1.04;  // of a length by that baseline
+    EXPECT_NEAR(result.T_previous_current.translation().norm(), scale * trueSinceStart(i, i - 1).translation().norm(),
+                0.01 * scale);
+  }
+}
+
 /// Of another camera, descriptor, or the same bytes to be read as numbers, which neither name nor width tells.
 TEST(VisualOdometry, StartsAgainFromTheLastPoseWithOtherFeatures) {
   StereoCamera other = synthetic::camera();
