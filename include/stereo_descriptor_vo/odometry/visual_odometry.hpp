@@ -22,7 +22,8 @@ class VisualOdometry {
 
   /// Processes the next pair. Stamps must increase, features and guess must pass check(), else std::invalid_argument
   /// and the state is as before. `guess` is one more hypothesis of the motion, never a measurement. A pair's camera
-  /// that isLike() the first one's continues the map; another camera starts a new epoch.
+  /// that isLike() the first one's continues the map; another camera starts a new epoch. A change that the images
+  /// refute is not believed for tracking/max_gap, and then begins a map.
   OdometryResult update(const StereoFeatures& features, const std::optional<MotionGuess>& guess = std::nullopt);
 
   /// Back to the initial pose and a new epoch; nothing is remembered.
