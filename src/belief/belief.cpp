@@ -17,6 +17,22 @@ std::string placeWords(const StereoFeatures& features, const std::vector<int>& m
   return words.str();
 }
 
+/// The motion in view that competes with the one that is found.
+std::string rivalWords(const MotionScene& scene, const MotionHypothesis& found) {
+  if (!found.rival) return "";
+  std::ostringstream words;
+  words << "two motions in view, of " << placeWords(scene.features, found.inlierFeatures()) << " and of "
+        << placeWords(scene.features, found.rival->features)
+        << (found.rival->is_torn ? ", above and below a row: are the images torn or damaged?"
+                                 : ": does something move in front of the camera?");
+  return words.str();
+}
+
+/// Log-odds beyond those without evidence.
+double logBeyond(double log_odds) {
+  return std::log(std::exp(log_odds) - std::exp(kUnsuspected));
+}
+
 }  // namespace
 
 bool Doubt::lasts() const {
@@ -44,47 +60,34 @@ void Doubt::fade() {
 }
 
 Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
-  const double rivals = std::exp(std::min(-sdvo::logOdds(found.probability), kCertain));
-  const double misled = std::exp(logOddsMisled(found));
+  const double rivals = std::min(-sdvo::logOdds(found.probability), kCertain), misled = logOddsMisled(found);
   if (lasts()) log_odds_ = std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain);
-  const double carried = std::exp(log_odds_);
-  const std::string carried_cause = cause_;
-  const auto largest = std::max_element(evidence.begin(), evidence.end(),
-                                        [](const Evidence& a, const Evidence& b) { return a.log_odds < b.log_odds; });
-  double shown = 0.0;
-  for (const Evidence& each : evidence) shown += std::max(std::exp(each.log_odds) - std::exp(kUnsuspected), 0.0);
-  raise(evidence);
-
-  Belief belief;
-  belief.probability = 1.0 / (1.0 + rivals + misled + shown + carried);
   // Without a prior the camera may as well have stood.
   const ExpectedMotion expected = scene.prior.empty() ? ExpectedMotion() : scene.prior.front();
   const Vector6d innovation = expected.innovation(found.motion.T_current_reference.inverse());
   const Matrix6d deviation = momentOf(innovation) + expected.covariance;
-  const double another = (misled + shown + carried) * belief.probability;
-  belief.moment = another * deviation;
 
+  MotionMixture mixture;
+  mixture.add({rivals, Matrix6d::Zero(), rivalWords(scene, found)});  // the pair has their moment already
+  mixture.add({misled, deviation, innovationWords(found) + ": followed is something else"});
+  for (const Evidence& each : evidence)
+    if (each.log_odds > kUnsuspected) mixture.add({logBeyond(each.log_odds), deviation, each.cause});
+  mixture.add({log_odds_, deviation, "a moment ago " + cause_});
+  raise(evidence);
+  Belief belief;
+  belief.probability = mixture.probability();
+  belief.moment = mixture.moment();
   std::ostringstream words;
-  if (found.rival && rivals >= std::max({misled, shown, carried})) {
-    words << "two motions in view, of " << placeWords(scene.features, found.inlierFeatures()) << " and of "
-          << placeWords(scene.features, found.rival->features) << ", the second with a probability of "
-          << found.rival->probability
-          << (found.rival->is_torn ? ", above and below a row: are the images torn or damaged?"
-                                   : ": does something move in front of the camera?");
-  } else if (misled >= std::max(shown, carried)) {
-    words << innovationWords(found) << ": followed with a probability of " << 1.0 - belief.probability
-          << " is something else";
-  } else {
-    words << (shown >= carried ? largest->cause : "a moment ago " + carried_cause)
-          << ": the motion is wrong with a probability of " << 1.0 - belief.probability;
-  }
+  words << mixture.likeliest().cause << ": the motion is wrong with a probability of " << 1.0 - belief.probability;
   belief.reason = words.str();
-  raise(rivals + misled, !found.rival || rivals < misled ? "the motion changed faster than a vehicle's can"
-                         : found.rival->is_torn          ? "the images seemed to be torn or damaged"
-                                                         : "something else moved in view");
+  raise(std::exp(rivals) + std::exp(misled), !found.rival || rivals < misled
+                                                 ? "the motion changed faster than a vehicle's can"
+                                             : found.rival->is_torn ? "the images seemed to be torn or damaged"
+                                                                    : "something else moved in view");
   // Errors of successive motions that follow one mover add up.
   double distance = distance_ + std::sqrt(deviation.topLeftCorner<3, 3>().trace() / 3.0);
   double angle = angle_ + std::sqrt(deviation.bottomRightCorner<3, 3>().trace() / 3.0);
+  const double another = 1.0 - belief.probability - mixture.probability(mixture.alternatives().front());
   belief.pose_moment = another * isotropic(distance * distance, angle * angle);
   if (lasts()) distance_ = distance, angle_ = angle;
   return belief;

@@ -218,25 +218,27 @@ std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypo
 /// The chosen motion's probability, and the moment of the rivals around it.
 void compare(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses,
              const std::vector<RivalMotion>& rivals, MotionHypothesis& chosen) {
-  double largest = 0.0;  // of the log-ratios; the chosen motion has 0
-  for (const RivalMotion& rival : rivals) largest = std::max(largest, rival.log_ratio);
-  double total = std::exp(-largest);
-  for (const RivalMotion& rival : rivals) total += std::exp(rival.log_ratio - largest);
-  chosen.probability = std::exp(-largest) / total;
-  std::vector<int> explained;
+  const auto motionOf = [&](const RivalMotion& rival) -> const Eigen::Isometry3d& {
+    return hypotheses[rival.hypothesis].motion.T_current_reference;
+  };
+  MotionMixture mixture;
   for (const RivalMotion& rival : rivals) {
-    explained.insert(explained.end(), rival.features.begin(), rival.features.end());
-    const Eigen::Isometry3d& T = hypotheses[rival.hypothesis].motion.T_current_reference;
-    const double probability = std::exp(rival.log_ratio - largest) / total;
     // Both motions have the same reference.
-    const Eigen::Isometry3d apart = chosen.motion.T_current_reference * T.inverse();
-    chosen.rivals_moment += probability * momentOf(logSE3(apart));
-    if (isTolerable(scene, chosen.motion.T_current_reference, apart)) {
+    const Eigen::Isometry3d apart = chosen.motion.T_current_reference * motionOf(rival).inverse();
+    mixture.add({rival.log_ratio, momentOf(logSE3(apart)), ""});
+  }
+  chosen.probability = mixture.probability();
+  chosen.rivals_moment = mixture.moment();
+  std::vector<int> explained;
+  for (std::size_t k = 0; k < rivals.size(); ++k) {
+    const RivalMotion& rival = rivals[k];
+    explained.insert(explained.end(), rival.features.begin(), rival.features.end());
+    const double probability = mixture.probability(mixture.alternatives()[k]);
+    if (isTolerable(scene, chosen.motion.T_current_reference,
+                    chosen.motion.T_current_reference * motionOf(rival).inverse()))
       chosen.probability += probability;
-      continue;
-    }
-    if (!chosen.rival || chosen.rival->probability < probability)
-      chosen.rival = {T, probability, rival.features, rival.is_torn};
+    else if (!chosen.rival || chosen.rival->probability < probability)
+      chosen.rival = {motionOf(rival), probability, rival.features, rival.is_torn};
   }
   // Matches that rivals explain are no evidence against the chosen motion.
   explained = sorted(std::move(explained));
@@ -260,27 +262,22 @@ double probabilityOf(double log_odds) {
 }
 
 PlaceBelief weigh(const FoundPlace& place, const std::vector<ExpectedMotion>& prior) {
-  const auto weight = [&](const Eigen::Isometry3d& T_current_newest) {
-    double log_weight = std::log(kTailProbability);  // the prior may be wrong
+  const auto logWeight = [&](const Eigen::Isometry3d& T_current_newest) {
+    double log_weight = prior.empty() ? 0.0 : std::log(kTailProbability);  // the prior may be wrong
     for (const ExpectedMotion& expected : prior)
       log_weight = std::max(log_weight, -0.5 * expected.normalisedSquare(T_current_newest.inverse(), Matrix6d::Zero()));
-    return prior.empty() ? 1.0 : std::exp(log_weight);
+    return log_weight;
   };
   Eigen::Isometry3d chosen = place.T_current_newest, other = place.alike.value_or(chosen);
-  if (weight(other) > weight(chosen)) std::swap(chosen, other);
-  PlaceBelief belief{chosen, Matrix6d::Zero(), ": the place may be another one"};
-  double total = weight(chosen);
-  if (place.alike) {
-    belief.moment += weight(other) * momentOf(logSE3(chosen * other.inverse()));
-    belief.reason = ": other places of the map look alike";
-    total += weight(other);
-  }
-  for (const ExpectedMotion& expected : prior) {
-    const double by_chance = kTailProbability * place.chance;
-    belief.moment += by_chance * (momentOf(expected.innovation(chosen.inverse())) + expected.covariance);
-    total += by_chance;
-  }
-  belief.moment /= total;
+  if (logWeight(other) > logWeight(chosen)) std::swap(chosen, other);
+  PlaceBelief belief{chosen, {}};
+  if (place.alike)
+    belief.mixture.add({logWeight(other) - logWeight(chosen), momentOf(logSE3(chosen * other.inverse())),
+                        "other places of the map look alike"});
+  for (const ExpectedMotion& expected : prior)
+    belief.mixture.add({std::log(kTailProbability * place.chance) - logWeight(chosen),
+                        momentOf(expected.innovation(chosen.inverse())) + expected.covariance,
+                        "the place may be another one"});
   return belief;
 }
 

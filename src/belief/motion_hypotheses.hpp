@@ -12,6 +12,7 @@
 #include "../map/reacquisition.hpp"
 #include "../motion/motion_estimator.hpp"
 #include "../motion/noise.hpp"
+#include "motion_mixture.hpp"
 #include "motion_prior.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
@@ -34,14 +35,13 @@ constexpr double kUnsuspected = -6.9, kCertain = -kUnsuspected;
 double logOdds(double probability);
 double probabilityOf(double log_odds);
 
-/// Posterior of the pair's pose in the map, after an outage.
+/// The pair's pose in the map, after an outage.
 struct PlaceBelief {
   Eigen::Isometry3d T_current_newest;  ///< motion to the likeliest place
-  Matrix6d moment;                     ///< second moment of its error, m and rad
-  std::string reason;                  ///< names the alternative
+  MotionMixture mixture;
 };
 
-/// Mixture of the places that look alike and, if these match by chance, of the camera's motion by the `prior`.
+/// The alternatives are a place that looks alike and, if both match by chance, the camera's motion by the `prior`.
 PlaceBelief weigh(const FoundPlace& place, const std::vector<ExpectedMotion>& prior);
 
 /// The input of a search for a pair's motion. The references must outlive it.

@@ -22,7 +22,8 @@ Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation);
 ///
 /// The rig's error is common to all motions: unlike noise it adds up with the distance. Pose and rig are one Gaussian
 /// with a cross-covariance (Schmidt 1966: the pose considers what it cannot observe), kept as the rig's distribution,
-/// which CalibrationFilter has, and the pose's given the rig: its derivative by the rig (the exposure) and what remains.
+/// which CalibrationFilter has, and the pose's given the rig: its derivative by the rig (the exposure) and what
+/// remains.
 class PoseCovariance {
  public:
   /// Of the last pose without the rig's error; zero in the beginning.

@@ -444,8 +444,9 @@ void VisualOdometry::Impl::widen(const PairSearch& pair, const Belief& belief, S
   add(unexpected(scene, found), Matrix6d::Zero());  // stamps change the velocity, not the pose
   if (isDoubtful(belief)) add(belief.moment, belief.pose_moment);
   if (!scene.place) return;
-  step.covariance += scene.place->moment;
-  state_.covariance.spread(scene.place->moment);
+  const Matrix6d of_places = scene.place->mixture.moment();
+  step.covariance += of_places;
+  state_.covariance.spread(of_places);
 }
 
 /// Reason, if a motion has too small a probability or too large a covariance; else empty.
@@ -455,7 +456,7 @@ std::string VisualOdometry::Impl::doubtWords(const PairSearch& pair, const Candi
   const MotionScene& scene = *pair.scene();
   const MotionHypothesis& found = pair.found();
   Matrix6d covariance = candidate.adjustment.since_keyframe + unexpected(scene, found);
-  if (scene.place) covariance += scene.place->moment;
+  if (scene.place) covariance += scene.place->mixture.moment();
   const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   if (deviation <= options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance) return "";
   std::ostringstream words;
@@ -464,7 +465,7 @@ std::string VisualOdometry::Impl::doubtWords(const PairSearch& pair, const Candi
   else
     words << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
           << " m exceeds tracking/doubtful_deviation";
-  return words.str() + (scene.place ? scene.place->reason : "");
+  return words.str() + (scene.place ? ": " + scene.place->mixture.cause() : "");
 }
 
 bool VisualOdometry::Impl::isDoubtful(const Belief& belief) const {

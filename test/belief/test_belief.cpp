@@ -133,4 +133,18 @@ TEST_F(Weighed, TheErrorsOfADoubtThatLastsAddUp) {
   EXPECT_NEAR(second.pose_moment(2, 2), 4.0 * first.pose_moment(2, 2), 0.1) << "both motions may be wrong alike";
 }
 
+TEST(MotionMixture, WeighsAlternativesHoweverLikelyOneIs) {
+  MotionMixture mixture;
+  EXPECT_EQ(mixture.probability(), 1.0);
+  EXPECT_TRUE(mixture.moment().isZero() && mixture.cause().empty());
+  mixture.add({std::log(0.5), Matrix6d::Identity(), "a mover"});
+  mixture.add({std::log(1.5), 4.0 * Matrix6d::Identity(), "a knock"});
+  EXPECT_NEAR(mixture.probability(), 1.0 / 3.0, 1e-12);
+  EXPECT_NEAR(mixture.moment()(2, 2), (0.5 + 6.0) / 3.0, 1e-12);
+  EXPECT_EQ(mixture.cause(), "a knock");
+  mixture.add({1e4, 9.0 * Matrix6d::Identity(), "another pair"});
+  EXPECT_EQ(mixture.probability(), 0.0);
+  EXPECT_NEAR(mixture.moment()(2, 2), 9.0, 1e-12);
+}
+
 }  // namespace sdvo::test_belief
