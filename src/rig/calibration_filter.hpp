@@ -43,8 +43,8 @@ class CalibrationFilter {
   /// Averages the variance, px^2, of the disparity error that all sightings of a point share, as a window estimates it.
   void noteCommon(double square);
 
-  /// The right camera rotated, and features are rotated back. Adds the covariance of this rotation, rad^2, and returns it
-  /// as the rig's.
+  /// The right camera rotated, and features are rotated back. Adds the covariance of this rotation, rad^2, and returns
+  /// it as the rig's.
   RigEstimate::Matrix widen(const StereoCamera& camera, const Eigen::Matrix3d& rotation);
 
   /// Result of the last window, px.
