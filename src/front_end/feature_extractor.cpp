@@ -7,13 +7,13 @@
 #include <string>
 
 #include "../common/kernel.hpp"
-#include "../common/statistics.hpp"
 #include "../common/stopwatch.hpp"
 #include "../common/text.hpp"
 #include "depth_scale.hpp"
 #include "exposure_balance.hpp"
 #include "feature_detector.hpp"
 #include "patch_cutter.hpp"
+#include "repeated_texture.hpp"
 #include "rig_monitor.hpp"
 #include "stereo_descriptor.hpp"
 #include "stereo_matcher.hpp"
@@ -67,22 +67,6 @@ std::string wordsOn(const StereoFeatures& features, const std::string& diagnosis
   if (features.report.stereo_matched == 0)
     return "no stereo matches: either different scenes or moments, or rows far apart, or a scene too near";
   return features.count() == 0 ? "every feature is too close to an image border for its descriptor" : "";
-}
-
-/// Removes matches whose disparity may be a period off, and says so where they are most of them.
-std::string removeRepeated(std::vector<StereoMatch>& matches, const StereoCamera& camera, double max_disparity) {
-  std::vector<double> periods;
-  for (const StereoMatch& match : matches)
-    if (match.period > 0.f) periods.push_back(match.period);
-  const std::size_t all = matches.size();
-  const auto repeats = [](const StereoMatch& match) { return match.period > 0.f; };
-  matches.erase(std::remove_if(matches.begin(), matches.end(), repeats), matches.end());
-  if (2 * periods.size() <= all) return "";
-  const double period = median(periods);
-  return text(0, periods.size(), " of ", all, " matches are of texture that repeats every ", period,
-              " px along the row, so their disparity may be a period off: if nothing is nearer than ") +
-         text(2, camera.fx * camera.baseline / period, " m, set stereo/epipolar/max_disparity (") +
-         text(0, max_disparity, ") below ", period);
 }
 
 cv::Mat cutPatches(const cv::Mat& image, const StereoFeatures& features) {
