@@ -4,8 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "../../src/common/processor.hpp"
 #include "../../src/front_end/block_differences.hpp"
+#include "../kernels.hpp"
 
 namespace sdvo::test_block_differences {
 
@@ -31,16 +31,14 @@ void expectSums(const cv::Mat& left, const cv::Mat& right, int count = 77) {
 }
 
 TEST(BlockDifferences, AreSumsOverWholeBlocks) {
-  for (const bool with_vectors : {true, false}) {
-    allowVectorKernels(with_vectors);
+  withEveryKernel([] {
     for (const bool extreme : {false, true}) {
       expectSums<4>(noise(3, extreme), noise(5, extreme));
       expectSums<5>(noise(3, extreme), noise(5, extreme));
     }
     for (const int count : {1, 15, 16, 17, 32, 33}) expectSums<4>(noise(3, false), noise(5, false), count);
     expectSums<5>(cv::Mat(40, 131, CV_8U, cv::Scalar(0)), cv::Mat(40, 131, CV_8U, cv::Scalar(255)));
-  }
-  allowVectorKernels(true);
+  });
 }
 
 }  // namespace sdvo::test_block_differences

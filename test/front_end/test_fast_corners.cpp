@@ -3,8 +3,8 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "../../src/common/processor.hpp"
 #include "../../src/front_end/fast_corners.hpp"
+#include "../kernels.hpp"
 #include "../synthetic_scene.hpp"
 
 namespace sdvo {
@@ -53,9 +53,7 @@ TEST(FastCorners, AreThoseOfOpenCvInPartsOfImages) {
 }
 
 TEST(FastCorners, AreTheSameWithoutVectors) {
-  allowVectorKernels(false);
-  expectCornersOfOpenCv(noise({150, 80}, 7), 20);
-  allowVectorKernels(true);
+  withEveryKernel([] { expectCornersOfOpenCv(noise({150, 80}, 7), 20); });
 }
 
 }  // namespace test_fast_corners

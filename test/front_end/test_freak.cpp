@@ -2,8 +2,8 @@
 
 #include <set>
 
-#include "../../src/common/processor.hpp"
 #include "../../src/front_end/freak.hpp"
+#include "../kernels.hpp"
 #include "../synthetic_scene.hpp"
 
 namespace sdvo::test_freak {
@@ -321,14 +321,11 @@ TEST(Freak, BitsCompareThePairsInOrder) {
     described.emplace_back(1, Freak::kBytes, CV_8U);
     rows.push_back(described.back().ptr());
   }
-  for (const bool with_vectors : {true, false}) {
-    allowVectorKernels(with_vectors);
+  withEveryKernel([&] {
     freak.describe(keypoints, rows);
     for (std::size_t i = 0; i < keypoints.size(); ++i)
-      ASSERT_EQ(cv::norm(described[i], rowByPairs(freak, keypoints[i]), cv::NORM_HAMMING), 0.0)
-          << i << ", " << with_vectors;
-  }
-  allowVectorKernels(true);
+      ASSERT_EQ(cv::norm(described[i], rowByPairs(freak, keypoints[i]), cv::NORM_HAMMING), 0.0) << i;
+  });
 }
 
 }  // namespace sdvo::test_freak

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "../../src/common/processor.hpp"
 #include "../../src/front_end/slanted_patch.hpp"
+#include "../kernels.hpp"
 
 namespace sdvo {
 
@@ -65,7 +65,6 @@ TEST(SamplePatch, SlantShiftsRowsFromTheCentre) {
 }
 
 TEST(SamplePatch, IsTheSameToTheBitWithAndWithoutVectors) {
-  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
   cv::Mat image(120, 150, CV_8U);
   cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
   cv::RNG random(7);
@@ -73,12 +72,11 @@ TEST(SamplePatch, IsTheSameToTheBitWithAndWithoutVectors) {
   for (int trial = 0; trial < 500; ++trial) {
     const float x = random.uniform(0.f, 49.f), y = random.uniform(0.f, 19.f), slant = random.uniform(-0.8f, 0.8f);
     const int radius = 1 + trial % 7;
-    std::vector<float> fast(static_cast<std::size_t>((2 * radius + 1) * kPatchStride)), plain = fast;
-    samplePatch(image, kBorder, x, y, slant, radius, fast.data());
-    allowVectorKernels(false);
-    samplePatch(image, kBorder, x, y, slant, radius, plain.data());
-    allowVectorKernels(true);
-    ASSERT_EQ(fast, plain) << "radius " << radius;
+    ofEveryKernel([&] {
+      std::vector<float> samples(static_cast<std::size_t>((2 * radius + 1) * kPatchStride));
+      samplePatch(image, kBorder, x, y, slant, radius, samples.data());
+      return samples;
+    });
   }
 }
 
@@ -161,16 +159,11 @@ std::vector<float> everythingOf(const cv::Mat& left, const cv::Mat& right, float
 }
 
 TEST(SlantedPatch, IsTheSameToTheBitWithAndWithoutVectors) {
-  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
   const cv::Mat left = noise(7), right = noise(9);
   cv::RNG random(11);
   for (int trial = 0; trial < 200; ++trial) {
     const float x = random.uniform(5.f, 70.f), y = random.uniform(0.f, 49.f), slant = random.uniform(-0.8f, 0.8f);
-    const std::vector<float> fast = everythingOf(left, right, x, y, slant);
-    allowVectorKernels(false);
-    const std::vector<float> plain = everythingOf(left, right, x, y, slant);
-    allowVectorKernels(true);
-    ASSERT_EQ(fast, plain);
+    ofEveryKernel([&] { return everythingOf(left, right, x, y, slant); });
   }
 }
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "../../src/common/processor.hpp"
 #include "../../src/front_end/stereo_matcher.hpp"
+#include "../kernels.hpp"
 #include "../synthetic_scene.hpp"
 
 namespace sdvo {
@@ -380,20 +380,11 @@ TEST(EpipolarSearch, RefusesPatchesThatCorrelateLittle) {
 }
 
 TEST(EpipolarSearch, FindsTheSameToTheBitWithAndWithoutVectors) {
-  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
   const Views pair = smoothPair(17.3, 0.6);
   int compared = 0;
   for (float v = 0.f; v < 160.f; v += 7.3f)
-    for (float u = 0.f; u < 320.f; u += 5.7f) {
-      const auto fast = find(pair, {u, v});
-      allowVectorKernels(false);
-      const auto plain = find(pair, {u, v});
-      allowVectorKernels(true);
-      ASSERT_EQ(fast.has_value(), plain.has_value()) << u << ", " << v;
-      if (!fast) continue;
-      ++compared;
-      ASSERT_EQ(*fast, *plain) << u << ", " << v;
-    }
+    for (float u = 0.f; u < 320.f; u += 5.7f)
+      compared += ofEveryKernel([&] { return find(pair, {u, v}); }).has_value();
   EXPECT_GT(compared, 500);
 }
 

@@ -3,8 +3,8 @@
 #include <bitset>
 #include <vector>
 
-#include "../../src/common/processor.hpp"
 #include "../../src/matching/hamming_distances.hpp"
+#include "../kernels.hpp"
 
 namespace sdvo::test_hamming_distances {
 
@@ -14,8 +14,7 @@ TEST(HammingDistances, CountTheBitsThatDiffer) {
     cv::Mat rows(9, bytes, CV_8U);
     cv::RNG(static_cast<std::uint64_t>(bytes)).fill(rows, cv::RNG::UNIFORM, 0, 256);
     const cv::Mat row = rows.row(8), others = rows.rowRange(0, 8);
-    for (const bool with_vectors : {true, false}) {
-      allowVectorKernels(with_vectors);
+    withEveryKernel([&] {
       std::vector<float> distances(candidates.size());
       hammingDistances(row.ptr(), others, candidates.data(), candidates.size(), distances.data());
       for (std::size_t k = 0; k < candidates.size(); ++k) {
@@ -24,9 +23,8 @@ TEST(HammingDistances, CountTheBitsThatDiffer) {
           bits += std::bitset<8>(row.at<std::uint8_t>(byte) ^ others.at<std::uint8_t>(candidates[k], byte)).count();
         EXPECT_EQ(distances[k], static_cast<float>(bits)) << bytes << " bytes, row " << candidates[k];
       }
-    }
+    });
   }
-  allowVectorKernels(true);
 }
 
 }  // namespace sdvo::test_hamming_distances
