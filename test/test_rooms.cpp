@@ -33,7 +33,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"places", {"common", "options", "motion", "matching", "map", "belief", "rig", "odometry"}},
     {"data", {"common", "options"}},
     {"config", {"common", "options", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places"}},
-    {"check", {"common", "options", "front_end", "motion", "matching", "map", "belief", "rig", "odometry"}},
+    {"check", {"common", "options", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "config"}},
     {"messages",
      {"common", "options", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places"}},
     {"ros",

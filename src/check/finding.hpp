@@ -1,6 +1,9 @@
 #pragma once
 
+#include <locale>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace sdvo {
@@ -31,6 +34,24 @@ inline Finding judged(bool fails, bool is_doubtful, const std::string& what, con
   if (!fails && !is_doubtful) return {Verdict::kOk, what};
   return {fails ? Verdict::kFail : Verdict::kWarn, what, remedy};
 }
+
+using Findings = std::vector<Finding>;
+
+/// Figures that /diagnostics show beside a finding, by name.
+class Values {
+ public:
+  template <class Value>
+  void add(const std::string& name, const Value& value) {
+    std::ostringstream words;
+    words.imbue(std::locale::classic());
+    words << value;
+    all_.emplace_back(name, words.str());
+  }
+  const std::vector<std::pair<std::string, std::string>>& all() const { return all_; }
+
+ private:
+  std::vector<std::pair<std::string, std::string>> all_;
+};
 
 /// A step of a camera's check.
 struct CheckStep {

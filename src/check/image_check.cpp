@@ -115,6 +115,17 @@ Finding checkExposure(double dark, double bright, bool takes_turns, double min_i
   return judged(false, bright > max_intensity, what, kTooBright);
 }
 
+Finding checkCorners(double corners, int least, const std::string& more) {
+  return judged(corners < least, false, text(0, corners, " corners") + more,
+                "focus, light, or a scene with texture; a lower detector/min_contrast");
+}
+
+Finding RefusalCheck::judge(double few) const {
+  return judged(refused_ > few * pairs_, refused_ > 0,
+                text(0, refused_, " of ", pairs_, " pairs refused") + (why_.empty() ? "" : ": " + why_),
+                "look at both images: sides, mounting, calibration");
+}
+
 void ImageCheck::add(const cv::Mat& left, const cv::Mat& right, const ExtractionReport& report) {
   constexpr double kWhite = 250.0;  // grey levels
   dark_.push_back(std::min(report.mean_intensity[0], report.mean_intensity[1]));
@@ -149,12 +160,12 @@ Finding ImageCheck::exposure(double min_intensity, double max_intensity) const {
 
 Finding ImageCheck::texture(int min_corners, double min_share) const {
   const double few = quantile(corners_, 0.1), share = quantile(matched_, 0.5);
-  const std::string what = text(0, quantile(corners_, 0.5), " corners (median), 90 % of the pairs have ", few,
-                                " or more; ", 100.0 * share, " % are found in the right image");
-  if (quantile(corners_, 0.5) < min_corners)
-    return {Verdict::kFail, what, "focus, light, or a scene with texture; a lower detector/min_contrast"};
-  if (few < min_corners) return {Verdict::kWarn, what, "some views have hardly any texture"};
-  return judged(false, share < min_share, what,
+  const Finding usual = checkCorners(quantile(corners_, 0.5), min_corners,
+                                     text(0, " (median), 90 % of the pairs have ", few, " or more; ", 100.0 * share,
+                                          " % are found in the right image"));
+  if (usual.isFault()) return usual;
+  if (few < min_corners) return {Verdict::kWarn, usual.what, "some views have hardly any texture"};
+  return judged(false, share < min_share, usual.what,
                 "the scene is nearer than stereo/epipolar/max_disparity reaches, or repeats itself");
 }
 

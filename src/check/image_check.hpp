@@ -81,6 +81,29 @@ class ExposureTurns {
 /// `dark`, `bright`: mean grey levels of the darker and the brighter side.
 Finding checkExposure(double dark, double bright, bool takes_turns, double min_intensity, double max_intensity);
 
+/// `more`: other figures.
+Finding checkCorners(double corners, int least, const std::string& more = "");
+
+/// Whether left and right belong together, as the extraction judges each pair.
+class RefusalCheck {
+ public:
+  void add(const ExtractionReport& report) {
+    ++pairs_;
+    if (!report.refused) return;
+    ++refused_;
+    why_ = report.status;
+  }
+
+  int pairs() const { return pairs_; }
+  int refused() const { return refused_; }
+  /// `few`: ratio of refused pairs up to which it is no failure.
+  Finding judge(double few) const;
+
+ private:
+  int pairs_ = 0, refused_ = 0;
+  std::string why_;
+};
+
 /// Quality of the images for features: exposure, texture, motion blur, and motion of the view from pair to pair.
 class ImageCheck {
  public:

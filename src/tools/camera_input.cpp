@@ -12,6 +12,7 @@
 #include "../check/axes_check.hpp"
 #include "../messages/frames.hpp"
 #include "../messages/stamps.hpp"
+#include "../ros/transforms/transforms.hpp"
 
 namespace sdvo {
 
@@ -131,34 +132,28 @@ std::optional<Eigen::Isometry3d> CameraInput::find(const std::string& parent, co
   return std::nullopt;
 }
 
-std::string CameraInput::baseAbove(std::string frame) const {
-  std::set<std::string> passed;  // frames may stand in a circle
-  while (passed.insert(frame).second && transforms_._getParent(frame, ros::Time(0), frame))
-    if (bases_.count(frame) > 0) return frame;
+std::string CameraInput::baseAbove(const std::string& frame) const {
+  for (const std::string& above : ancestorsOf(frame, transforms_))
+    if (bases_.count(above) > 0) return above;
   return "base_link";
 }
 
 ArrivalFindings CameraInput::findings(const std::string& base_frame_given, bool is_recorded) {
-  ArrivalFindings found{arrivals_.checkTopics(), arrivals_.checkStamps(), {}, arrivals_.pairRate(), std::nullopt};
+  ArrivalFindings found = arrivals_.findings({});
   const std::string camera = ros_conversions::cleanFrameId(frame_.value_or(""));
   const std::string base_frame = base_frame_given.empty() ? baseAbove(camera) : base_frame_given;
   try {
     found.T_base_camera = tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
     found.transform = checkMount(base_frame, camera, *found.T_base_camera);
-  } catch (const tf2::TransformException& e) {
+  } catch (const tf2::TransformException&) {
     if (is_recorded && !has_transforms_ && tf_problem_.empty())
       found.transform = {Verdict::kOpen, "this recording has none", "the odometry needs it while it runs"};
     else if (!frame_)
       found.transform = {Verdict::kOpen, "no image came", "see topics"};
-    else if (camera.empty())
-      found.transform = {Verdict::kOpen, "the images name no frame", "set frame_id in the driver"};
     else
-      found.transform = {
-          Verdict::kFail,
-          "no transform from " + camera + " to " + base_frame + ": " + (tf_problem_.empty() ? e.what() : tf_problem_),
-          "publish it in the URDF or by the driver. For a camera that looks ahead: rosrun tf2_ros "
-          "static_transform_publisher 0 0 0 -0.5 0.5 -0.5 0.5 " +
-              base_frame + " " + camera};
+      found.transform = explainMissing(base_frame, camera, transforms_);
+    if (camera.empty()) found.transform.verdict = Verdict::kOpen;
+    if (found.transform.isFault() && !tf_problem_.empty()) found.transform.what += "; " + tf_problem_;
   }
   return found;
 }

@@ -14,7 +14,7 @@
 #include <set>
 #include <string>
 
-#include "../ros/diagnostics/arrival_log.hpp"
+#include "../check/arrival_log.hpp"
 #include "../ros/synchronisation/stereo_input.hpp"
 #include "../ros/synchronisation/synchronisers.hpp"
 #include "pair_reader.hpp"
@@ -69,7 +69,7 @@ class CameraInput {
               const MessagePtr& right_info);
   template <int input>
   void pair(const MessagePtr& message);
-  std::string baseAbove(std::string frame) const;
+  std::string baseAbove(const std::string& frame) const;
 
   const StereoTopics topics_;
   const std::optional<StereoInfos> infos_;

@@ -13,12 +13,12 @@
 #include <string>
 #include <vector>
 
-#include "../check/finding.hpp"
+#include "../check/camera_check.hpp"
 #include "../common/worker.hpp"
 #include "../messages/stamps.hpp"
 #include "../ros/synchronisation/camera_finder.hpp"
-#include "camera_check.hpp"
 #include "camera_input.hpp"
+#include "offline_run.hpp"
 #include "page.hpp"
 #include "pair_reader.hpp"
 #include "recording.hpp"
@@ -84,12 +84,13 @@ int check(const Arguments& arguments) {
   StereoSource source = arguments.source;
   source.pairing = options.pairing;
   OfflineRun run(options);
-  CameraCheck check(options, run);
+  CameraCheck check(options);
   const auto use = [&](const RecordedPair& pair) {
-    check.add(pair, run.process(pair.camera, pair.left, pair.right, pair.stamp, pair.right_delay));
+    const StereoFeatures features = run.process(pair.camera, pair.left, pair.right, pair.stamp, pair.right_delay);
+    check.add(pair, features, run.last());
   };
   const auto report = [&](const std::string& camera, const ArrivalFindings& arrivals) {
-    const std::vector<CheckStep> steps = check.steps(arrivals);
+    const std::vector<CheckStep> steps = check.steps(arrivals, run.times());
     for (const auto& [name, finding] : steps)
       std::cout << std::left << std::setw(5) << toString(finding.verdict) << std::setw(14) << name << finding.what
                 << (finding.remedy.empty() ? "" : "\n" + std::string(19, ' ') + "-> " + finding.remedy) << "\n";

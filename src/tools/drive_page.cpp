@@ -124,8 +124,7 @@ std::vector<Words> figuresOf(const DriveReport& report, const OfflineRun& run) {
        text(2, run.distance(), " m in ",
             1e-9 * static_cast<double>(frames.back().odometry.stamp - frames.front().odometry.stamp), " s")},
       {"discontinuities of the pose", std::to_string(run.discontinuities())},
-      {"time of a pair", text(1, run.time(0.5), " ms (median), ", run.time(0.95), " ms (95 %), ", run.cpuTime(),
-                              " ms of CPU; without reading and decoding")}};
+      {"time of a pair", run.times().words() + "; without reading and decoding"}};
   // Stamps of a folder may begin at zero, those of a simulation, too.
   constexpr std::int64_t kThisCentury = 1000000000LL * 1000000000LL;
   if (frames.front().odometry.stamp > kThisCentury)

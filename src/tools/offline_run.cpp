@@ -102,14 +102,11 @@ double OfflineRun::distance() const {
   return frames_.empty() ? 0.0 : frames_.back().odometry.distance;
 }
 
-double OfflineRun::time(double quantile) const {
+PairTimes OfflineRun::times() const {
   std::vector<double> times;
   for (const Frame& frame : frames_) times.push_back(1e3 * frame.total_time);
-  return sdvo::quantile(std::move(times), quantile);
-}
-
-double OfflineRun::cpuTime() const {
-  return frames_.empty() ? 0.0 : 1e3 * cpu_time_ / static_cast<double>(frames_.size());
+  const double pairs = static_cast<double>(std::max<std::size_t>(frames_.size(), 1));
+  return {quantile(times, 0.5), quantile(times, 0.95), 1e3 * cpu_time_ / pairs};
 }
 
 Trajectory OfflineRun::poses() const {

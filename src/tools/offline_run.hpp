@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../check/mosaic_check.hpp"
+#include "../check/work_load.hpp"
 #include "../config/pipeline_options.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
@@ -49,10 +50,8 @@ class OfflineRun {
   int discontinuities() const;
   double distance() const;  ///< m
 
-  /// Of a pair, ms, without decoding; zero without pairs. `quantile`: 0.5 is the median. For processBeside() it is the
-  /// time between two pairs.
-  double time(double quantile) const;
-  double cpuTime() const;  ///< mean of all threads
+  /// Without decoding; zero without pairs. For processBeside() a pair is done when the next one is.
+  PairTimes times() const;
 
   /// Whether images are a mosaic, in words; empty: they are not.
   std::string mosaic() const { return mosaic_.problem(); }

@@ -16,7 +16,6 @@
 #include "../config/interface_options.hpp"
 #include "../data/euroc_dataset.hpp"
 #include "../messages/stamps.hpp"
-#include "../ros/diagnostics/arrival_log.hpp"
 #include "camera_input.hpp"
 #include "pair_reader.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
@@ -69,7 +68,7 @@ class FolderRecording : public Recording {
         log.note(input, stamp, seconds);
       log.notePair(stamp, stamp, seconds);
     }
-    return {log.checkTopics(), log.checkStamps(), {Verdict::kOpen, "a folder has none"}, log.pairRate(), std::nullopt};
+    return log.findings({Verdict::kOpen, "a folder has none"});
   }
 
   std::set<std::int64_t> leftStamps() const override {

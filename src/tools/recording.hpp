@@ -4,34 +4,16 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "../check/finding.hpp"
-#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "../check/arrival_log.hpp"
+#include "../check/recorded_pair.hpp"
 #include "stereo_messages.hpp"
 
 namespace sdvo {
-
-/// A rectified pair of a recording.
-struct RecordedPair {
-  StereoCamera camera;
-  cv::Mat left, right;      ///< CV_8U grey; valid as long as the call that it is given to
-  std::int64_t stamp;       ///< ns
-  std::string lens;         ///< the calibration's model in words; empty: unknown
-  std::string unrectified;  ///< evidence that the images are not rectified; empty: none
-  double right_delay = 0.0;  ///< s, of the right image by its stamp, where approximate_sync pairs them
-};
-
-/// Steps of a camera's check that concern how the messages of pairs arrive.
-struct ArrivalFindings {
-  Finding topics, stamps, transform;
-  double rate = 0.0;                               ///< of the pairs, Hz
-  std::optional<Eigen::Isometry3d> T_base_camera;  ///< as TF has it
-};
 
 /// A recorded drive. Its images stay on disk.
 class Recording {

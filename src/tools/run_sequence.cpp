@@ -15,12 +15,12 @@
 #include <string>
 #include <vector>
 
+#include "../check/camera_check.hpp"
 #include "../common/progress.hpp"
 #include "../common/text.hpp"
 #include "../config/pipeline_options.hpp"
 #include "../data/image_file.hpp"
 #include "../data/text_file.hpp"
-#include "camera_check.hpp"
 #include "drive_page.hpp"
 #include "feature_halves.hpp"
 #include "offline_run.hpp"
@@ -76,7 +76,7 @@ void follow(Recording& recording, const Arguments& arguments, Drive& drive, Plac
         name << std::setw(6) << std::setfill('0') << drive.whole.pairs() - 1 << ".jpg";
         writeImage(fs::path(arguments.pictures) / name.str(), drawLeft(pair, features, drive.whole.last()));
       }
-      if (seen) seen->check.add(pair, features), seen->pictures.add(pair, features, drive.whole.last());
+      if (seen) seen->check.add(pair, features, drive.whole.last()), seen->pictures.add(pair, features, drive.whole.last());
       if (arguments.halves) {
         const auto halved = halves.split(features, drive.whole.last().flow);
         drive.first.processFeatures(features.select(halved[0]));
@@ -109,11 +109,12 @@ void writePoses(const std::string& path, const std::string& format, const Offlin
 }
 
 void printSummary(const OfflineRun& run, PipelineOptions options) {
+  const PairTimes times = run.times();
   std::cout << "options " << hashOptions(listOptions(options)) << " (a hash: of equal options it is equal)\n"
             << run.pairs() << " pairs, " << run.pairsWithoutPose() << " without a pose, " << run.distance()
             << " m travelled\n"
-            << "time per pair: median " << run.time(0.5) << " ms, p95 " << run.time(0.95) << " ms, CPU "
-            << run.cpuTime() << " ms (decoding excluded)\n";
+            << "time per pair: median " << times.median << " ms, p95 " << times.late << " ms, CPU " << times.cpu
+            << " ms (decoding excluded)\n";
 }
 
 /// `way`: m, of all recordings.
@@ -161,7 +162,7 @@ Finding makePage(const Recording& recording, const Drive& drive, const Seen& see
   report.name = fs::absolute(input).lexically_normal().string();
   report.left_out = drive.left_out;
   report.options = options;
-  report.steps = seen.check.steps(arrivals);
+  report.steps = seen.check.steps(arrivals, drive.whole.times());
   report.rows = seen.check.rows();
   // An optical frame looks along z, with x to the right.
   report.R_base_camera << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
@@ -204,11 +205,12 @@ void writeResults(const Drive& drive, const std::vector<SelfCheck>& checks, Pipe
   std::string rows = std::string(SelfCheck::columns()) + "\n";
   for (const SelfCheck& check : checks) rows += check.row() + "\n";
   if (!checks.empty()) writeTextFile(base + ".self_check.csv", rows);
+  const PairTimes times = run.times();
   std::ostringstream report;
   report << "bag,pairs,without_pose,discontinuities,left_out,distance_m,median_ms,p95_ms,cpu_ms,options,problem\n"
          << std::fixed << std::setprecision(1) << name << "," << run.pairs() << "," << run.pairsWithoutPose() << ","
-         << run.discontinuities() << "," << drive.left_out << "," << run.distance() << "," << run.time(0.5) << ","
-         << run.time(0.95) << "," << run.cpuTime() << "," << hashOptions(listOptions(options)) << ",\n";
+         << run.discontinuities() << "," << drive.left_out << "," << run.distance() << "," << times.median << ","
+         << times.late << "," << times.cpu << "," << hashOptions(listOptions(options)) << ",\n";
   writeTextFile(reportOf(arguments), report.str());
 }
 
@@ -266,7 +268,7 @@ int run(const Arguments& arguments) {
   Drive drive(options);
   std::optional<Seen> seen;
   if (!arguments.page.empty())
-    seen.emplace(Seen{CameraCheck(options, drive.whole), DrivePictures(std::min(arguments.frames, recording->size()))});
+    seen.emplace(Seen{CameraCheck(options), DrivePictures(std::min(arguments.frames, recording->size()))});
   follow(*recording, arguments, drive, places ? &*places : nullptr, seen ? &*seen : nullptr);
   const OfflineRun& run = drive.whole;
   if (places)

@@ -230,7 +230,7 @@ class Faults(PipelineCase):
         def swap(images):
             images[0].data, images[1].data = images[1].data, images[0].data
         self.run_for(3.0, swap)
-        self.expect('stereo_features', 'features', error, 'not a rectified pair')
+        self.expect('stereo_features', 'features', error, 'pairs refused')
         self.expect('stereo_features', 'exposure', ok)
 
         self.expect('stereo_features', 'input rate', error, 'no pairs for')

@@ -95,7 +95,7 @@ TEST_F(RobotTransformsTest, TheMissingLinkIsNamedWithACommandThatPublishesIt) {
   send(tf_, {transform("odom", "oak_base", ros::Time::now())});
   waitForMarker(tf_);
   expectWords(transforms_->explainMissing("base_link", "oak_left"),
-              {"below 'oak_body', 'oak_base', 'odom'; set base_frame_id to the robot's own one"});
+              {"below 'oak_body', 'oak_base', 'odom': set base_frame_id to the robot's own one"});
   EXPECT_TRUE(contains(transforms_->explainMissing("base_link", ""), "no frame_id"));
 }
 

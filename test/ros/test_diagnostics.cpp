@@ -1,9 +1,6 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "../../src/ros/diagnostics/diagnostics.hpp"
-#include "../said.hpp"
 
 namespace sdvo::test_diagnostics {
 
@@ -26,18 +23,6 @@ TEST(WallUpdater, PrintsTheFirstFindingAndTheFaultsOfOthers) {
     EXPECT_EQ(status.level, level) << message;
     EXPECT_EQ(status.message, message);
   }
-}
-
-TEST(CheckLatency, StampsOfTheFutureAndThePastAndSinceBoot) {
-  for (const double latency : {-0.05, 0.0, 0.3}) EXPECT_EQ(checkLatency(latency, 0.5).verdict, Verdict::kOk) << latency;
-  for (const auto& [latency, words] :
-       {std::pair(0.6, "0.600 s from image to pose: is the machine too slow"), std::pair(-0.3, "in the future"),
-        std::pair(-5.0, "in the future"), std::pair(std::nan(""), "--clock"),
-        std::pair(1795739520.0, "another clock than this machine")}) {
-    EXPECT_EQ(checkLatency(latency, 0.5).verdict, Verdict::kWarn) << latency;
-    EXPECT_TRUE(contains(checkLatency(latency, 0.5).text(), words)) << latency;
-  }
-  EXPECT_FALSE(contains(checkLatency(1795739520.0, 0.5).text(), "too slow"));
 }
 
 }  // namespace sdvo::test_diagnostics

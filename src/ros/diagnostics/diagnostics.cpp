@@ -22,21 +22,16 @@ RateOptions expectedRates(const ros::NodeHandle& nh, RateOptions rates) {
 
 }  // namespace
 
-Finding checkLatency(double latency, double most) {
-  constexpr double kEpoch = 1e7;  // s, a third of a year
-  constexpr double kAhead = 0.1;  // s, a step of the slowest simulated clocks (chosen)
-  const std::string what = text(3, latency, " s from image to pose");
-  if (std::isnan(latency))
-    return {Verdict::kWarn, what, "use_sim_time is true, and nobody publishes /clock: rosbag play needs --clock"};
-  if (latency > kEpoch)
-    return {Verdict::kWarn, what,
-            "the images have another clock than this machine: since its boot, or of a recording that is played "
-            "without use_sim_time and --clock?"};
-  if (latency > most)
-    return {Verdict::kWarn, what, "is the machine too slow, or are the clocks of two machines different?"};
-  return judged(false, latency < -kAhead, what,
-                "the images are stamped in the future, where TF knows nothing yet: is the camera's clock that of this "
-                "machine?");
+void WallUpdater::print(const Findings& findings, Status& status) {
+  for (const Finding& finding : findings) {
+    const auto level = finding.verdict == Verdict::kFail   ? Level::ERROR
+                       : finding.verdict == Verdict::kWarn ? Level::WARN
+                                                           : Level::OK;
+    if (&finding == &findings.front())
+      status.summary(level, finding.text());
+    else
+      status.mergeSummary(level, finding.text());
+  }
 }
 
 ImageDiagnostics::ImageDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
@@ -59,9 +54,7 @@ void ImageDiagnostics::note(const StereoFeatures& features) {
   exposures_.add(features.report.mean_intensity[0]);
   last_ = features.report;
   last_count_ = features.count();
-  ++pairs_;
-  refused_pairs_ += features.report.refused;
-  if (features.report.refused) refused_status_ = features.report.status;
+  refusals_.add(features.report);
 }
 
 void ImageDiagnostics::noteFailure(const std::string& why) {
@@ -69,26 +62,14 @@ void ImageDiagnostics::noteFailure(const std::string& why) {
   failure_ = why;
 }
 
-Findings ImageDiagnostics::judgeSynchronisation(Status& values) {
-  const double now = ros::SteadyTime::now().toSec();
-  const std::string loss = arrivals_.explainLoss(now);
-  const auto silence = arrivals_.pairs().silence();
-  const double gap = arrivals_.takeLargestGap();
-  values.add("largest gap [ms]", text(2, 1e3 * gap));
-  for (const auto& [topic, rate] : arrivals_.rates(now)) values.add("rate of " + topic + " [Hz]", text(2, rate));
-  Finding finding{Verdict::kOk, silence ? kNoPairs : "left and right belong together"};
-  if (!loss.empty() && (!silence || silence->isFault()))
-    finding = {Verdict::kWarn, loss};
-  else if (!silence && gap > thresholds_.max_gap)
-    finding = {Verdict::kWarn, text(1, "left and right are ", 1e3 * gap, " ms apart"),
-               "are the cameras triggered together?"};
-  return unused_.judge(std::move(finding), values);
+Findings ImageDiagnostics::judgeSynchronisation(Values& values) {
+  return unused_.judge(arrivals_.checkPairs(ros::SteadyTime::now().toSec(), thresholds_.max_gap, values), values);
 }
 
-Findings ImageDiagnostics::judgeExposure(Status& values) {
+Findings ImageDiagnostics::judgeExposure(Values& values) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (arrivals_.pairs().silence()) return {{Verdict::kOk, kNoPairs}};
-  if (!last_ || (pairs_ == 0 && !failure_.empty())) return {{Verdict::kOk, "no pair was used"}};
+  if (!last_ || (refusals_.pairs() == 0 && !failure_.empty())) return {{Verdict::kOk, "no pair was used"}};
   const double left = last_->mean_intensity[0], right = last_->mean_intensity[1];
   values.add("mean grey level", text(1, left, " left, ", right, " right"));
   values.add("sharpness [grey levels a px]", text(2, last_->sharpness[0], " left, ", last_->sharpness[1], " right"));
@@ -97,19 +78,18 @@ Findings ImageDiagnostics::judgeExposure(Status& values) {
               .asWarning()};
 }
 
-Findings ImageDiagnostics::judgeFeatures(Status& values) {
+Findings ImageDiagnostics::judgeFeatures(Values& values) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const std::string failure = std::exchange(failure_, "");
-  const int pairs = std::exchange(pairs_, 0), refused = std::exchange(refused_pairs_, 0);
+  const RefusalCheck refusals = std::exchange(refusals_, {});
   if (arrivals_.pairs().silence()) return {{Verdict::kOk, kNoPairs}};
   values.add("corners", last_ ? last_->detected : 0);
   values.add("features", last_count_);
-  values.add("refused pairs, of the last second", text(0, refused, " of ", pairs));
+  values.add("refused pairs, of the last second", text(0, refusals.refused(), " of ", refusals.pairs()));
   if (!failure.empty()) return {{Verdict::kFail, failure}};
-  if (refused > 0) return {{Verdict::kFail, "left and right are not a rectified pair", refused_status_}};
-  if (last_ && last_->detected < thresholds_.min_corners)
-    return {
-        {Verdict::kWarn, text(0, "only ", last_->detected, " corners"), "little texture, darkness, or out of focus?"}};
+  if (refusals.refused() > 0) return {refusals.judge(0.0)};
+  if (last_)
+    if (const Finding few = checkCorners(last_->detected, thresholds_.min_corners); few.isFault()) return {few.asWarning()};
   if (last_ && !last_->status.empty()) return {{Verdict::kWarn, last_->status}};
   return {{Verdict::kOk, text(0, last_count_, " features")}};
 }
@@ -134,7 +114,7 @@ void OdometryDiagnostics::note(const stereo_descriptor_vo::VoInfo& info) {
   input_.note(nanoseconds(info.header.stamp));  // under the lock, so that no task sees an input without its state
 }
 
-Findings OdometryDiagnostics::judge(Status& values) {
+Findings OdometryDiagnostics::judge(Values& values) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (last_) addValues(values);
   if (auto silence = input_.silence()) {
@@ -147,18 +127,18 @@ Findings OdometryDiagnostics::judge(Status& values) {
       checkMoment({last_->right_delay, last_->right_delay_sigma}).asWarning()};
 }
 
-Findings OdometryDiagnostics::judgeInput(Status& values) {
+Findings OdometryDiagnostics::judgeInput(Values& values) {
   return unused_.judge(input_.judge(values).front(), values);
 }
 
-Findings OdometryDiagnostics::judgeLatency(Status&) {
+Findings OdometryDiagnostics::judgeLatency(Values&) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (input_.silence() || !last_ || last_->state == "WAITING") return {{Verdict::kOk, "no pose"}};
   return {checkLatency(last_->latency, max_latency_)};
 }
 
 /// Under the lock.
-void OdometryDiagnostics::addValues(Status& values) const {
+void OdometryDiagnostics::addValues(Values& values) const {
   values.add("epoch", last_->epoch);
   values.add("features", last_->features);
   values.add("matches", last_->matches);
@@ -194,7 +174,7 @@ void PlaceDiagnostics::restart() {
   last_.reset();
 }
 
-Findings PlaceDiagnostics::judge(Status& values) {
+Findings PlaceDiagnostics::judge(Values& values) {
   const std::lock_guard<std::mutex> lock(mutex_);
   Finding finding{Verdict::kOk, last_ ? "recognising places" : "no key frame yet"};
   if (const auto silence = input_.silence())

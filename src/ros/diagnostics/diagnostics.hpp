@@ -1,5 +1,6 @@
 #pragma once
 
+#include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/node_handle.h>
 #include <stereo_descriptor_vo/PlaceInfo.h>
 #include <stereo_descriptor_vo/VoInfo.h>
@@ -8,16 +9,46 @@
 #include <optional>
 #include <string>
 
+#include "../../check/arrival_log.hpp"
 #include "../../check/image_check.hpp"
+#include "../../check/input_monitor.hpp"
+#include "../../check/unused_input.hpp"
+#include "../../check/work_load.hpp"
 #include "../../config/interface_options.hpp"
-#include "arrival_log.hpp"
-#include "diagnostic_tasks.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 namespace sdvo {
 
-/// `latency` of poses, s; negative for stamps in the future. `most`: the largest one that is no fault.
-Finding checkLatency(double latency, double most);
+/// /diagnostics once a second of wall time: simulated time stands still at the end of a bag, which diagnostics must
+/// report. Declare it after the members that its tasks use.
+class WallUpdater {
+ public:
+  using Status = diagnostic_updater::DiagnosticStatusWrapper;
+  using Level = diagnostic_msgs::DiagnosticStatus;
+
+  WallUpdater(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name)
+      : updater_(nh, private_nh, name) {
+    updater_.setHardwareID("none");
+    timer_ =
+        nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.force_update(); });
+  }
+
+  template <class Owner>
+  void add(const std::string& task, Owner* owner, Findings (Owner::*judge)(Values& values)) {
+    updater_.add(task, [owner, judge](Status& status) {
+      Values values;
+      print((owner->*judge)(values), status);
+      for (const auto& [name, value] : values.all()) status.add(name, value);
+    });
+  }
+
+  /// The first finding, and the faults among the others.
+  static void print(const Findings& findings, Status& status);
+
+ private:
+  diagnostic_updater::Updater updater_;
+  ros::WallTimer timer_;
+};
 
 /// /diagnostics of the image side. Tasks: rate, synchronisation, exposure, features, load.
 class ImageDiagnostics {
@@ -31,11 +62,9 @@ class ImageDiagnostics {
   void noteFailure(const std::string& why);
 
  private:
-  using Status = WallUpdater::Status;
-
-  Findings judgeSynchronisation(Status& values);
-  Findings judgeExposure(Status& values);
-  Findings judgeFeatures(Status& values);
+  Findings judgeSynchronisation(Values& values);
+  Findings judgeExposure(Values& values);
+  Findings judgeFeatures(Values& values);
 
   const ImageThresholds thresholds_;
   ArrivalLog& arrivals_;
@@ -46,8 +75,8 @@ class ImageDiagnostics {
   std::optional<ExtractionReport> last_;
   int last_count_ = 0;  ///< of features
   ExposureTurns exposures_;
-  std::string failure_, refused_status_;
-  int pairs_ = 0, refused_pairs_ = 0;  ///< since the last call of the task
+  std::string failure_;
+  RefusalCheck refusals_;  ///< since the last call of the task
 
   WallUpdater updater_;
 };
@@ -64,12 +93,10 @@ class OdometryDiagnostics {
   void note(const stereo_descriptor_vo::VoInfo& info);
 
  private:
-  using Status = WallUpdater::Status;
-
-  Findings judge(Status& values);
-  Findings judgeInput(Status& values);
-  Findings judgeLatency(Status& values);
-  void addValues(Status& values) const;
+  Findings judge(Values& values);
+  Findings judgeInput(Values& values);
+  Findings judgeLatency(Values& values);
+  void addValues(Values& values) const;
 
   const double max_latency_;
   UnusedInput& unused_;
@@ -96,9 +123,7 @@ class PlaceDiagnostics {
   void restart();
 
  private:
-  using Status = WallUpdater::Status;
-
-  Findings judge(Status& values);
+  Findings judge(Values& values);
 
   UnusedInput& unused_;
   InputMonitor input_;

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "../diagnostics/diagnostic_tasks.hpp"
+#include "../../check/input_monitor.hpp"
 #include "../node/params.hpp"
 #include "../node/threads.hpp"
 #include "../node/throttles.hpp"

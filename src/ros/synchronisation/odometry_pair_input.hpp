@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "../diagnostics/diagnostic_tasks.hpp"
+#include "../../check/unused_input.hpp"
 #include "../node/threads.hpp"
 #include "synchronisers.hpp"
 

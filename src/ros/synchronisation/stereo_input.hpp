@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "../../check/arrival_log.hpp"
 #include "../../config/interface_options.hpp"
-#include "../diagnostics/arrival_log.hpp"
 #include "../node/threads.hpp"
 #include "image_subscriber.hpp"
 #include "synchronisers.hpp"

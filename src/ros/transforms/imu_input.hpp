@@ -11,8 +11,8 @@
 #include <optional>
 #include <string>
 
+#include "../../check/unused_input.hpp"
 #include "../../common/imu_tracks.hpp"
-#include "../diagnostics/diagnostic_tasks.hpp"
 #include "transforms.hpp"
 
 namespace sdvo {

@@ -21,6 +21,36 @@ using ros_conversions::cleanFrameId;
 
 namespace {
 
+constexpr const char* kSetFrame = "set the camera's optical frame in its driver";
+
+bool hasAncestor(const std::string& frame, const std::string& ancestor, const tf2::BufferCore& buffer) {
+  const std::vector<std::string> all = ancestorsOf(frame, buffer);
+  return std::any_of(all.begin(), all.end(), [&](const auto& each) { return cleanFrameId(each) == ancestor; });
+}
+
+/// `base_frame`, or the frame below it whose name begins most like that of `frame`: a part of the same camera.
+std::string nearestBelow(const std::string& base_frame, const std::string& frame, const tf2::BufferCore& buffer) {
+  constexpr std::ptrdiff_t kLeast = 3;  // letters (chosen)
+  std::vector<std::string> all;
+  buffer._getFrameStrings(all);
+  std::string nearest = base_frame;
+  std::ptrdiff_t most = kLeast;
+  for (const std::string& each : all) {
+    const auto differ = std::mismatch(each.begin(), each.end(), frame.begin(), frame.end());
+    const std::ptrdiff_t alike = differ.first - each.begin();
+    if (alike <= most || !hasAncestor(each, base_frame, buffer)) continue;
+    nearest = each;
+    most = alike;
+  }
+  return nearest;
+}
+
+bool isMoving(const std::string& parent, const std::string& child, const tf2::BufferCore& buffer) try {
+  return !buffer.lookupTransform(parent, child, ros::Time(0)).header.stamp.isZero();  // zero: static throughout
+} catch (const tf2::TransformException&) {
+  return false;
+}
+
 /// Throws std::invalid_argument for what is no place on a robot, nor on the earth.
 Eigen::Isometry3d checked(const geometry_msgs::TransformStamped& transform) {
   constexpr double kFarthest = 1e8;  // m, as of poses
@@ -32,6 +62,40 @@ Eigen::Isometry3d checked(const geometry_msgs::TransformStamped& transform) {
 }
 
 }  // namespace
+
+std::vector<std::string> ancestorsOf(const std::string& frame, const tf2::BufferCore& buffer) {
+  constexpr std::size_t kLongestChain = 1000;  // of tf2; frames may stand in a circle
+  std::vector<std::string> found;
+  std::string parent;
+  while (found.size() < kLongestChain && buffer._getParent(found.empty() ? frame : found.back(), ros::Time(0), parent))
+    found.push_back(parent);
+  return found;
+}
+
+Finding explainMissing(const std::string& base_frame, const std::string& camera_frame, const tf2::BufferCore& buffer) {
+  if (camera_frame.empty()) return {Verdict::kFail, "the left images have no frame_id", kSetFrame};
+  const std::string missing =
+      "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame + "' on TF: ";
+  const std::vector<std::string> above = ancestorsOf(camera_frame, buffer);
+  const std::string root = cleanFrameId(above.empty() ? camera_frame : above.back());
+  if (isMoving(root, camera_frame, buffer)) {  // `root` may be a world's frame, of another odometry
+    std::string names;
+    for (const std::string& frame : above) names += (names.empty() ? "'" : ", '") + cleanFrameId(frame) + "'";
+    return {Verdict::kFail, missing + "it has the camera below " + names,
+            "set base_frame_id to the robot's own one of these"};
+  }
+  const bool has_base = buffer._frameExists(base_frame);
+  const std::string last = nearestBelow(base_frame, root, buffer);
+  const bool is_optical = above.empty();  // nothing but the images names it
+  return {Verdict::kFail,
+          missing + "the link " + last + " -> " + root + " is missing (TF has " +
+              (has_base ? "" : "no '" + base_frame + "' and ") +
+              (is_optical ? "nothing above '" + camera_frame + "'" : "'" + camera_frame + "' below '" + root + "'") + ")",
+          "let the robot's URDF or the camera's driver publish it. For a camera that looks ahead: rosrun tf2_ros "
+          "static_transform_publisher 0 0 0 " +
+              std::string(is_optical ? "-0.5 0.5 -0.5 0.5 " : "0 0 0 ") + last + " " + root +
+              (has_base ? "" : ". For one in the hand: base_frame_id:=" + root)};
+}
 
 RobotTransforms::RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours,
                                  std::uint32_t tag, Report warn)
@@ -110,74 +174,16 @@ void RobotTransforms::watch(const geometry_msgs::TransformStamped& transform, co
     warn_(contention + ": '" + child + "' has a parent already, '" + parent +
           "'. If that is a part of the robot, set " + "base_frame_id:=" + parent +
           " (or invert_tf), else set publish_tf to false in one of them");
-  else if ((child == ours->odom || hasAncestor(ours->odom, child)) &&
-           (parent == ours->base || hasAncestor(parent, ours->base)))
+  else if ((child == ours->odom || hasAncestor(ours->odom, child, buffer_)) &&
+           (parent == ours->base || hasAncestor(parent, ours->base, buffer_)))
     warn_(contention + ": a cycle; nothing can be looked up on TF. Swap frames, or set publish_tf to false here");
 }
 
-/// From the parent on.
-std::vector<std::string> RobotTransforms::ancestors(const std::string& frame) const {
-  constexpr std::size_t kLongestChain = 1000;  // of tf2
-  std::vector<std::string> found;
-  std::string parent;
-  while (found.size() < kLongestChain && buffer_._getParent(found.empty() ? frame : found.back(), ros::Time(0), parent))
-    found.push_back(parent);
-  return found;
-}
-
-bool RobotTransforms::hasAncestor(const std::string& frame, const std::string& ancestor) const {
-  const std::vector<std::string> all = ancestors(frame);
-  return std::any_of(all.begin(), all.end(), [&](const auto& each) { return cleanFrameId(each) == ancestor; });
-}
-
-/// `base_frame`, or the frame below it whose name begins most like that of `frame`: a part of the same camera.
-std::string RobotTransforms::nearestBelow(const std::string& base_frame, const std::string& frame) const {
-  constexpr std::ptrdiff_t kLeast = 3;  // letters (chosen)
-  std::vector<std::string> all;
-  buffer_._getFrameStrings(all);
-  std::string nearest = base_frame;
-  std::ptrdiff_t most = kLeast;
-  for (const std::string& each : all) {
-    const auto differ = std::mismatch(each.begin(), each.end(), frame.begin(), frame.end());
-    const std::ptrdiff_t alike = differ.first - each.begin();
-    if (alike <= most || !hasAncestor(each, base_frame)) continue;
-    nearest = each;
-    most = alike;
-  }
-  return nearest;
-}
-
 std::string RobotTransforms::explainMissing(const std::string& base_frame, const std::string& camera_frame) const {
-  if (camera_frame.empty()) return "the left images have no frame_id: set the camera's optical frame in its driver";
   const std::optional<ros_conversions::OdometryFrames> ours = this->ours();
   if (ours && camera_frame == ours->odom)
-    return "the left images' frame_id is '" + camera_frame +
-           "', as odom_frame_id: set the camera's optical frame in its driver";
-  const std::string missing =
-      "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame + "' on TF: ";
-  const std::vector<std::string> above = ancestors(camera_frame);
-  const std::string root = cleanFrameId(above.empty() ? camera_frame : above.back());
-  if (isMoving(root, camera_frame)) {  // `root` may be a world's frame, of another odometry
-    std::string names;
-    for (const std::string& frame : above) names += (names.empty() ? "'" : ", '") + cleanFrameId(frame) + "'";
-    return missing + "it has the camera below " + names + "; set base_frame_id to the robot's own one of these";
-  }
-  const bool has_base = buffer_._frameExists(base_frame);
-  const std::string last = nearestBelow(base_frame, root);
-  const bool is_optical = above.empty();  // nothing but the images names it
-  return missing + "the link " + last + " -> " + root + " is missing (TF has " +
-         (has_base ? "" : "no '" + base_frame + "' and ") +
-         (is_optical ? "nothing above '" + camera_frame + "'" : "'" + camera_frame + "' below '" + root + "'") +
-         "). Let the robot's URDF or the camera's driver publish it. For a camera that looks ahead: rosrun tf2_ros "
-         "static_transform_publisher 0 0 0 " +
-         (is_optical ? "-0.5 0.5 -0.5 0.5 " : "0 0 0 ") + last + " " + root +
-         (has_base ? "" : ". For one in the hand: base_frame_id:=" + root);
-}
-
-bool RobotTransforms::isMoving(const std::string& parent, const std::string& child) const try {
-  return !buffer_.lookupTransform(parent, child, ros::Time(0)).header.stamp.isZero();  // zero: static throughout
-} catch (const tf2::TransformException&) {
-  return false;
+    return "the left images' frame_id is '" + camera_frame + "', as odom_frame_id: " + kSetFrame;
+  return sdvo::explainMissing(base_frame, camera_frame, buffer_).text();
 }
 
 void CameraMount::await(const std::string& base_frame, const std::string& camera_frame,

@@ -15,9 +15,16 @@
 #include <utility>
 #include <vector>
 
+#include "../../check/finding.hpp"
 #include "../../messages/frames.hpp"
 
 namespace sdvo {
+
+/// Frames above a frame on TF, from its parent on.
+std::vector<std::string> ancestorsOf(const std::string& frame, const tf2::BufferCore& buffer);
+
+/// Why TF lacks the camera's pose on the robot: the link that is missing, and a command that publishes it.
+Finding explainMissing(const std::string& base_frame, const std::string& camera_frame, const tf2::BufferCore& buffer);
 
 /// Listens to TF. An exception in tf2_ros' own listener ends the process, for example of one wild stamp on /tf; here
 /// such a transform is left out. Warns of publishers that contradict this node's transform. For any thread.
@@ -38,7 +45,7 @@ class RobotTransforms {
   std::optional<Eigen::Isometry3d> find(const std::string& parent, const std::string& child, std::string& problem,
                                         const ros::Time& time = ros::Time(0)) const;
 
-  /// Why find() returns none: the link that lacks, and a command that publishes it.
+  /// Why find() returns none.
   std::string explainMissing(const std::string& base_frame, const std::string& camera_frame) const;
 
   /// T_child(from)_child(to): motion of a frame between two times, by its pose in `fixed`.
@@ -50,11 +57,7 @@ class RobotTransforms {
 
   void receive(const Event& event, bool is_static);
   void watch(const geometry_msgs::TransformStamped& transform, const std::string& publisher);
-  std::vector<std::string> ancestors(const std::string& frame) const;
-  bool hasAncestor(const std::string& frame, const std::string& ancestor) const;
-  std::string nearestBelow(const std::string& base_frame, const std::string& frame) const;
   std::optional<ros_conversions::OdometryFrames> ours() const;
-  bool isMoving(const std::string& parent, const std::string& child) const;
 
   mutable std::mutex mutex_;
   std::optional<ros_conversions::OdometryFrames> ours_;  // under the mutex

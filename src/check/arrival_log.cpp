@@ -5,8 +5,8 @@
 #include <limits>
 #include <vector>
 
-#include "../../common/statistics.hpp"
-#include "../../common/text.hpp"
+#include "../common/statistics.hpp"
+#include "../common/text.hpp"
 
 namespace sdvo {
 namespace {
@@ -16,7 +16,12 @@ constexpr double kLately = 5.0;    // s, of losses and rates
 constexpr double kPatience = 1.0;  // s beyond the longest wait of a pair so far
 constexpr double kLate = 0.1;      // s between messages of one stamp (chosen): a queue is too short, perhaps
 constexpr double kHalf = 0.45;     // ratio of a period: images of one pair are nearer; below 0.5, for jitter
+constexpr double kOtherClock = 1.0;  // s between stamps and arrivals (chosen): no camera takes as long
 constexpr double kFewLost = 0.02;  // ratio of pairs (chosen): drivers lose one now and then
+
+constexpr const char* kNoPairs = "no pairs";
+constexpr const char* kTrigger = "trigger both cameras together, and stamp each image with its own time";
+constexpr const char* kLosses = "look for losses on the way (USB, network, processor)";
 
 double secondsBetween(std::int64_t a, std::int64_t b) {
   return 1e-9 * static_cast<double>(b - a);
@@ -158,21 +163,21 @@ std::string ArrivalLog::received(double begin) const {
   return all;
 }
 
-std::array<std::pair<std::string, double>, ArrivalLog::kInputs> ArrivalLog::rates(double now) const {
+Finding ArrivalLog::checkPairs(double now, double max_gap, Values& values) {
+  const std::string loss = explainLoss(now);
+  const auto silence = pairs_.silence();
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::array<std::pair<std::string, double>, kInputs> rates;
-  for (int input = 0; input < kInputs; ++input) {
-    const std::deque<Arrival>& arrivals = topics_[input].arrivals;
-    const auto lately = std::count_if(arrivals.begin(), arrivals.end(),
+  const double gap = std::exchange(largest_gap_, 0.0);
+  values.add("largest gap [ms]", text(2, 1e3 * gap));
+  for (const Topic& topic : topics_) {
+    const auto lately = std::count_if(topic.arrivals.begin(), topic.arrivals.end(),
                                       [&](const Arrival& arrival) { return arrival.now >= now - kLately; });
-    rates[input] = {topics_[input].name, static_cast<double>(lately) / std::clamp(now - begin_, 1.0, kLately)};
+    values.add("rate of " + topic.name + " [Hz]",
+               text(2, static_cast<double>(lately) / std::clamp(now - begin_, 1.0, kLately)));
   }
-  return rates;
-}
-
-double ArrivalLog::takeLargestGap() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return std::exchange(largest_gap_, 0.0);
+  if (!loss.empty() && (!silence || silence->isFault())) return {Verdict::kWarn, loss};
+  return judged(false, !silence && gap > max_gap,
+                silence ? kNoPairs : text(1, "left and right are up to ", 1e3 * gap, " ms apart"), kTrigger);
 }
 
 /// Between successive pairs, s.
@@ -207,8 +212,7 @@ Finding ArrivalLog::checkTopics() {
     if (has_pairs_) {
       const std::size_t periods = pairPeriods().size();
       if (periods == 0) return {Verdict::kOpen, "one pair alone", "take more of them"};
-      return judged(false, rate < options_.rates.min_rate || rate > options_.rates.max_rate,
-                    text(1, periods + 1, " pairs, ", rate, " Hz"), "5 to 60 Hz suit, 15 Hz or more for fast turns");
+      return checkRate(text(1, periods + 1, " pairs, ", rate, " Hz"), rate, options_.rates);
     }
   }
   return {Verdict::kFail, explainSilence(newest), "see docs/troubleshooting.md, 'Pairs that do not come together'"};
@@ -217,7 +221,7 @@ Finding ArrivalLog::checkTopics() {
 Finding ArrivalLog::checkStamps() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const std::vector<double> periods = pairPeriods();
-  if (periods.empty()) return {Verdict::kOpen, "no pairs"};
+  if (periods.empty()) return {Verdict::kOpen, kNoPairs};
   const std::deque<Arrival>&lefts = topics_[kLeftImage].arrivals, &rights = topics_[kRightImage].arrivals;
   const double all = static_cast<double>(std::max(lefts.size(), rights.size()));
   const double alone = 1.0 - static_cast<double>(periods.size() + 1) / all;
@@ -229,18 +233,14 @@ Finding ArrivalLog::checkStamps() const {
 
   if (*std::min_element(periods.begin(), periods.end()) <= 0.0)
     return {Verdict::kWarn, "stamps fall; " + what, "one recording at a time, and a driver that does not restart"};
-  if (std::abs(delay) > 1.0)
-    return {Verdict::kWarn,
-            text(0, "stamps are ", std::abs(delay), " s ", delay > 0.0 ? "behind" : "ahead of",
-                 " the clock of arrivals: another clock"),
-            "let the driver stamp with the system's clock: TF and filters compare stamps of several sources"};
-  if (alone > kFewLost)
-    return {Verdict::kWarn, what,
-            "some images have no partner of the same stamp: trigger both cameras together, "
-            "or look for losses on the way (network, USB)"};
+  if (const Finding clock = checkLatency(delay, kOtherClock, "arrival", kOtherClock); clock.isFault()) return clock;
+  if (alone > kFewLost) {
+    const std::string cause = advise(-std::numeric_limits<double>::infinity());
+    return {Verdict::kWarn, what, cause.empty() ? std::string(kTrigger) + ", or " + kLosses : cause.substr(2)};
+  }
   const auto gaps = std::count_if(periods.begin(), periods.end(), [&](double period) { return period > 1.5 * usual; });
   return judged(false, static_cast<double>(gaps) > kFewLost * static_cast<double>(periods.size()), what,
-                "pairs are missing: look for losses on the way (USB, network, processor)");
+                std::string("pairs are missing: ") + kLosses);
 }
 
 ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) const {

@@ -3,28 +3,23 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "../check/calibration_check.hpp"
 #include "../common/text.hpp"
 #include "../front_end/rig_monitor.hpp"
+#include "calibration_check.hpp"
 
 namespace sdvo {
 
-CameraCheck::CameraCheck(const PipelineOptions& options, const OfflineRun& run)
+CameraCheck::CameraCheck(const PipelineOptions& options)
     : options_(options),
-      run_(run),
       rows_(options.stereo_features.stereo.max_epipolar_residual, options.stereo_features.stereo.epipolar.max_disparity,
             RigMonitor::kReach),
       odometry_(options.visual_odometry.calibration.readout) {}
 
-void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) {
+void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features, const OdometryResult& result) {
   camera_ = pair.camera;
   lens_ = pair.lens;
   unrectified_ = pair.unrectified;
-  ++used_;
-  if (features.report.refused) {
-    ++refused_;
-    refusal_ = features.report.status;
-  }
+  refusals_.add(features.report);
   if (const auto corners = corner_pairs_.add(pair.left, pair.right, pair.stamp)) {
     rows_.add(*corners);
     lens_check_.add(pair.camera, *corners);
@@ -34,9 +29,8 @@ void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) 
   focus_.add(pair.left, pair.right);
   images_.add(pair.left, pair.right, features.report);
   emitter_.add(pair.left);
-  odometry_.add(features, run_.last());
-  if (run_.last().state == TrackingState::kTracking && run_.last().has_motion)
-    motions_.push_back(run_.last().T_previous_current);
+  odometry_.add(features, result);
+  if (result.state == TrackingState::kTracking && result.has_motion) motions_.push_back(result.T_previous_current);
   cv::hconcat(pair.left, pair.right, picture_);
 }
 
@@ -45,7 +39,8 @@ void CameraCheck::addUnusable(const std::string& problem) {
   problem_ = problem;
 }
 
-std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const {
+std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals, const PairTimes& times) const {
+  constexpr double kFewRefused = 0.1;  // share of the pairs (chosen)
   const Finding odometry = odometry_.judge(), frame_rate = images_.frameRate(odometry_.rotations());
   std::vector<CheckStep> steps = {
       {"topics", arrivals.topics},
@@ -58,14 +53,14 @@ std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const
       {"same moment", rows_.sameMoment()},
       {"shutter", odometry_.shutter()},
       {"rectification", rows_.rectification()},
-      {"refused pairs", rig()},
+      {"refused pairs", refusals_.judge(kFewRefused)},
       {"lens", lens_check_.judge()},
       {"texture", images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share)},
       {"motion blur", images_.blur()},
       {"emitter", emitter_.judge()},
       {"frame rate", odometry.isFault() ? frame_rate : frame_rate.asWarning()},  // which is enough to be followed
       {"odometry", odometry},
-      {"load", load(arrivals.rate)}};
+      {"load", checkLoad(1e-3 * times.cpu * arrivals.rate, thresholds_.max_load, ", " + times.words())}};
   const auto fault = std::find_if(steps.begin(), steps.end(),
                                   [](const CheckStep& step) { return step.finding.verdict == Verdict::kFail; });
   for (auto later = fault; later != steps.end(); ++later)
@@ -77,7 +72,7 @@ std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const
 
 Finding CameraCheck::calibration() const {
   if (unusable_ > 0) return {Verdict::kFail, problem_, "see docs/cameras.md, 'What a wrong camera_info looks like'"};
-  if (used_ == 0) return {Verdict::kOpen, "no pairs"};
+  if (refusals_.pairs() == 0) return {Verdict::kOpen, "no pairs"};
   return checkCalibration(camera_, lens_, unrectified_);
 }
 
@@ -102,22 +97,6 @@ Finding CameraCheck::mount(const std::optional<Eigen::Isometry3d>& T_base_camera
   const Finding finding = check.judge(floor.planar_tilt_sigma);
   if (floor.planar || !finding.isFault()) return finding;
   return {Verdict::kOk, finding.what + ", which counts if it drives on a floor (planar)"};
-}
-
-Finding CameraCheck::rig() const {
-  constexpr double kFew = 0.1;  // share of the pairs (chosen)
-  const std::string what =
-      text(0, refused_, " of ", used_, " pairs refused") + (refusal_.empty() ? "" : ": " + refusal_);
-  if (refused_ > kFew * used_) return {Verdict::kFail, what, "look at both images: sides, mounting, calibration"};
-  return judged(false, refused_ > 0, what);
-}
-
-Finding CameraCheck::load(double rate) const {
-  const double share = 1e-3 * run_.cpuTime() * rate;
-  return judged(false, share > thresholds_.max_load,
-                text(1, run_.cpuTime(), " ms of CPU time a pair, ", 100.0 * share, " % of one processor; done after ",
-                     run_.time(0.5), " ms (median), ", run_.time(0.95), " ms (95 %)"),
-                "fewer detector/max_features, smaller images or max_rate");
 }
 
 }  // namespace sdvo

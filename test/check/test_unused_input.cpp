@@ -1,54 +1,52 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/diagnostics/diagnostic_tasks.hpp"
+#include "../../src/check/unused_input.hpp"
 
 namespace sdvo::test_unused_input {
 
-using Status = WallUpdater::Status;
-using Level = WallUpdater::Level;
-
-Status diagnose(UnusedInput& unused) {
-  Status status;
-  WallUpdater::print(unused.judge({Verdict::kOk, "well"}, status), status);
-  return status;
+/// The fault; empty: none.
+std::string fault(UnusedInput& unused) {
+  Values values;
+  const Findings findings = unused.judge({Verdict::kOk, "well"}, values);
+  EXPECT_LE(findings.size(), 2u);
+  EXPECT_EQ(findings.front().what, "well");
+  return findings.size() < 2 ? "" : findings.back().text();
 }
 
 TEST(UnusedInput, WarnsOfWhatIsMuchAndOfWhatIsRare) {
   UnusedInput unused("pairs", 0.05);
-  diagnose(unused);
+  fault(unused);
   for (int i = 0; i < 100; ++i) unused.noteUsed();
   for (int i = 0; i < 2; ++i) unused.add(UnusedInput::kUnpaired);
-  EXPECT_EQ(diagnose(unused).level, Level::OK) << "an accident";
+  EXPECT_EQ(fault(unused), "") << "an accident";
   for (int i = 0; i < 8; ++i) unused.add(UnusedInput::kUnpaired);
-  const Status much = diagnose(unused);
-  EXPECT_EQ(much.level, Level::WARN);
-  EXPECT_EQ(much.message, "10 of 110 pairs unpaired");
-  for (int i = 0; i < 6; ++i) diagnose(unused);
-  EXPECT_EQ(diagnose(unused).level, Level::OK) << "long ago";
+  EXPECT_EQ(fault(unused), "10 of 110 pairs unpaired");
+  for (int i = 0; i < 6; ++i) fault(unused);
+  EXPECT_EQ(fault(unused), "") << "long ago";
 
   unused.add(UnusedInput::kLate);
-  EXPECT_EQ(diagnose(unused).message, "1 pairs late or with wrong stamps: check the driver's stamps");
-  EXPECT_EQ(diagnose(unused).level, Level::OK);
+  EXPECT_EQ(fault(unused), "1 pairs late or with wrong stamps: check the driver's stamps");
+  EXPECT_EQ(fault(unused), "");
   EXPECT_EQ(unused.sum(), 11u);
 }
 
 TEST(UnusedInput, MissingGuessesAreAShareOfWhatIsUsed) {
   UnusedInput unused("feature messages", 0.05);
-  diagnose(unused);
+  fault(unused);
   for (int i = 0; i < 20; ++i) {
     unused.noteUsed();
     if (i % 2 == 0) unused.add(UnusedInput::kNoGuess);
   }
-  EXPECT_EQ(diagnose(unused).message,
+  EXPECT_EQ(fault(unused),
             "10 of 20 feature messages without a guess of the motion: guess_timeout, or the source of the guess");
   EXPECT_EQ(unused.sum(), 0u);
 }
 
 TEST(UnusedInput, CausesThatOtherTasksExplainAreOnlyCounted) {
   UnusedInput unused("pairs", 0.05, {UnusedInput::kPushedOut});
-  diagnose(unused);
+  fault(unused);
   for (int i = 0; i < 20; ++i) unused.add(UnusedInput::kPushedOut);
-  EXPECT_EQ(diagnose(unused).level, Level::OK);
+  EXPECT_EQ(fault(unused), "");
   EXPECT_EQ(unused.count(UnusedInput::kPushedOut), 20u);
 }
 

@@ -3,18 +3,14 @@
 #include <chrono>
 #include <thread>
 
-#include "../../src/ros/diagnostics/diagnostic_tasks.hpp"
+#include "../../src/check/work_load.hpp"
 #include "../said.hpp"
-#include "message_samples.hpp"
 
 namespace sdvo::test_work_load {
 
-using Level = WallUpdater::Level;
-
-WallUpdater::Status diagnose(WorkLoad& load) {
-  WallUpdater::Status status;
-  WallUpdater::print(load.judge(status), status);
-  return status;
+Finding judge(WorkLoad& load) {
+  Values values;
+  return load.judge(values).front();
 }
 
 void work() {
@@ -30,14 +26,14 @@ TEST(WorkLoad, PairsDroppedWhileItWorkedAreOfASlowMachine) {
   }
   load.noteWait("the transform base <- camera", 0.0);  // it was there
   load.noteDropped(3);
-  EXPECT_EQ(diagnose(load).level, Level::WARN);
-  EXPECT_EQ(diagnose(load).level, Level::OK) << "of the time since";
+  EXPECT_EQ(judge(load).verdict, Verdict::kWarn);
+  EXPECT_EQ(judge(load).verdict, Verdict::kOk) << "of the time since";
   load.noteDropped(5);
   {
     const WorkLoad::Item item(load);
     work();
   }
-  EXPECT_TRUE(contains(diagnose(load).message, "too slow: 2 pairs dropped"));
+  EXPECT_TRUE(contains(judge(load).text(), "too slow: 2 pairs dropped"));
 }
 
 TEST(WorkLoad, PairsDroppedWhileItWaitedAreNot) {
@@ -48,10 +44,10 @@ TEST(WorkLoad, PairsDroppedWhileItWaitedAreNot) {
     load.noteWait("the transform base <- camera", 2.0);
   }
   load.noteDropped(40);
-  const WallUpdater::Status status = diagnose(load);
-  EXPECT_EQ(status.level, Level::WARN);
-  expectWords(status.message, {"40 pairs dropped", "waited for the transform base <- camera"});
-  EXPECT_FALSE(contains(status.message, "too slow")) << status.message;
+  const Finding found = judge(load);
+  EXPECT_EQ(found.verdict, Verdict::kWarn);
+  expectWords(found.text(), {"40 pairs dropped", "waited for the transform base <- camera"});
+  EXPECT_FALSE(contains(found.text(), "too slow")) << found.text();
 }
 
 TEST(WorkLoad, PairsDroppedWhileItMostlyRestedCameInBursts) {
@@ -59,9 +55,9 @@ TEST(WorkLoad, PairsDroppedWhileItMostlyRestedCameInBursts) {
   { const WorkLoad::Item item(load); }
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   load.noteDropped(9);
-  const WallUpdater::Status status = diagnose(load);
-  EXPECT_EQ(status.level, Level::WARN);
-  expectWords(status.message, {"9 pairs dropped", "come in bursts, set queue_size"});
+  const Finding found = judge(load);
+  EXPECT_EQ(found.verdict, Verdict::kWarn);
+  expectWords(found.text(), {"9 pairs dropped", "come in bursts, set queue_size"});
 }
 
 }  // namespace sdvo::test_work_load

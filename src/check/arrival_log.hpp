@@ -1,18 +1,29 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <deque>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "../../config/interface_options.hpp"
-#include "diagnostic_tasks.hpp"
+#include "../config/interface_options.hpp"
+#include "finding.hpp"
+#include "input_monitor.hpp"
+#include "unused_input.hpp"
 
 namespace sdvo {
+
+/// How the messages of a camera arrived: steps of its check, and what they need.
+struct ArrivalFindings {
+  Finding topics, stamps, transform;
+  double rate = 0.0;                               ///< of the pairs, Hz
+  std::optional<Eigen::Isometry3d> T_base_camera;  ///< as TF has it
+};
 
 /// Arrivals on the four inputs of a stereo camera, and the pairs made of them: rates, lateness, order, gaps, and images
 /// that make no pair, with the cause. /diagnostics, the log, check_camera and pages print its findings. Stamps in ns,
@@ -44,10 +55,8 @@ class ArrivalLog {
   /// reported once. Empty otherwise.
   std::string explainSilence(double now);
 
-  /// Hz, of each topic in the last seconds, with its name.
-  std::array<std::pair<std::string, double>, kInputs> rates(double now) const;
-  /// Largest difference between the stamps of a pair since the last call, s.
-  double takeLargestGap();
+  /// Of the last seconds: whether messages make pairs whose stamps differ by `max_gap` (s) at most.
+  Finding checkPairs(double now, double max_gap, Values& values);
 
   // Of all arrivals in memory.
 
@@ -56,6 +65,7 @@ class ArrivalLog {
   /// Whether stamps are of the clock of arrivals, increase, have no gaps, and have partners.
   Finding checkStamps() const;
   double pairRate() const;  ///< by the stamps, Hz; zero when it is not known
+  ArrivalFindings findings(const Finding& transform) { return {checkTopics(), checkStamps(), transform, pairRate(), {}}; }
 
  private:
   /// A message waits for its partners until its pair is complete, or until it is too old for one. kCounted: lost, and
