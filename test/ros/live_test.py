@@ -21,7 +21,7 @@ import rospy
 import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Pose, PoseWithCovarianceStamped, TransformStamped
+from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry, Path
 from nodelet.srv import NodeletLoad, NodeletUnload
 from sensor_msgs.msg import Image, Imu, PointCloud2
@@ -585,6 +585,32 @@ class Live(PipelineCase):
         T_odom_base = matrix_of(corrections()[-1].transform) @ matrix_of(transform.transform)
         np.testing.assert_allclose(T_odom_base[:3, 3], [now.x, now.y, self.odometry[3].pose.pose.position.z], atol=1.0)
 
+    def test_the_truth_on_tf_is_where_it_starts_and_what_errors_are_of(self):
+        self.start(config=self.config('visual_odometry: {ground_truth_frame_id: world, ground_truth_base_frame_id: marker}\n'))
+        errors = self.listen('ground_truth_error', PoseStamped)
+        times = itertools.count()
+        info = self.feed_messages(*self.camera.messages(0, time_of=next(times)))
+        self.assertEqual(info.state, 'WAITING')
+        self.assertIn('ground_truth_frame_id', info.reason)
+        tf = self.keep(tf2_ros.TransformBroadcaster())
+        tf.close = tf.pub_tf.unregister
+        self.until(lambda: self.is_sent_to_pipeline(tf.pub_tf))
+        for stamp in (info.header.stamp, info.header.stamp + rospy.Duration(9)):
+            marker = TransformStamped()
+            marker.header.frame_id, marker.child_frame_id, marker.header.stamp = 'world', 'marker', stamp
+            marker.transform.translation.x, marker.transform.translation.y = 10.0, 5.0
+            marker.transform.rotation.z = marker.transform.rotation.w = np.sqrt(0.5)  # looks along y
+            tf.sendTransform(marker)
+        self.until(lambda: self.feed_messages(*self.camera.messages(0, time_of=next(times))).state != 'WAITING')
+        np.testing.assert_allclose(matrix_of(self.odometry[0].pose.pose), matrix_of(marker.transform), atol=1e-9)
+        for i in (1, 2):
+            self.feed_messages(*self.camera.messages(i, time_of=next(times)))
+        self.until(lambda: errors.has(self.odometry[-1].header.stamp))
+        np.testing.assert_allclose(matrix_of(errors[0].pose), np.eye(4), atol=1e-9)
+        driven = self.odometry[-1].pose.pose.position
+        self.assertGreater(driven.y, 5.5)
+        self.assertAlmostEqual(errors[-1].pose.position.x, driven.y - 5.0, delta=1e-6)  # as if the base stood
+
     def test_nothing_works_while_the_wheels_stand(self):
         self.clock.jump_to(rospy.Time.from_sec(EPOCH))  # tests before carried it on, and a guess must not be old
         self.start(config=self.config('visual_odometry: {guess_frame_id: wheels, guess_timeout: 0.5, guess_min_translation: 0.1}\n'))
@@ -815,7 +841,8 @@ class Live(PipelineCase):
         for type_name, name, value in (('StereoFeatures', 'detector/max_features', -1),
                                        ('VisualOdometry', 'initial_pose', 'here'),
                                        ('VisualOdometry', 'odom_frame_id', '/base_link'), ('VisualOdometry', 'base_frame_id', ''),
-                                       ('VisualOdometry', 'guess_frame_id', 'odom'), ('PlaceRecognition', 'map_frame_id', '/'),
+                                       ('VisualOdometry', 'guess_frame_id', 'odom'), ('VisualOdometry', 'ground_truth_frame_id', 'world'),
+                                       ('PlaceRecognition', 'map_frame_id', '/'),
                                        ('PlaceRecognition', 'sync_queue_size', 'many')):
             nodelet = '%s/wrong_%s_%s' % (self.namespace, type_name, name.replace('/', '_'))
             rospy.set_param(nodelet + '/' + name, value)

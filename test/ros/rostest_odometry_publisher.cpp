@@ -248,6 +248,30 @@ TEST_F(OdometryPublisherTest, StartsAgainFromAnyPlace) {
   EXPECT_EQ(publisher_->path().poses.size(), 1u);
 }
 
+TEST_F(OdometryPublisherTest, ErrorsWaitForTheTruth) {
+  OdometryOutputOptions options;
+  options.ground_truth_frame_id = "world";
+  start(options);
+  const Inbox<geometry_msgs::PoseStamped> errors(nh_, "ground_truth_error");
+  ASSERT_TRUE(spinUntil([&] { return errors.isConnected(); }));
+  publish(resultAt(1));
+  publish(resultAt(2));
+  publisher_->publishErrors([](const ros::Time&) { return std::optional<Eigen::Isometry3d>(); });
+  const Eigen::Isometry3d T_odom_true(Eigen::Translation3d(0.5, 0.0, 0.0) *
+                                      Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d::UnitZ()));
+  publisher_->publishErrors([&](const ros::Time&) { return std::optional(T_odom_true); });
+  ASSERT_TRUE(spinUntil([&] { return errors.messages.size() == 2; }));
+  for (const std::size_t i : {0u, 1u}) {
+    const geometry_msgs::Point &found = odom_->messages.at(i).pose.pose.position,
+                               &error = errors.messages[i].pose.position;
+    EXPECT_EQ(errors.messages[i].header.stamp, odom_->messages[i].header.stamp);
+    EXPECT_EQ(errors.messages[i].header.frame_id, "base_link");
+    EXPECT_NEAR(error.x, found.y, 1e-9);  // the true base looks along y
+    EXPECT_NEAR(error.y, 0.5 - found.x, 1e-9);
+    EXPECT_NEAR(error.z, found.z, 1e-9);
+  }
+}
+
 TEST_F(OdometryPublisherTest, InfoTellsLatencyAndSession) {
   start({});
   const ros::Time stamp = ros::Time::now() - ros::Duration(2.0);

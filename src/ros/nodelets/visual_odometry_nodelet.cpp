@@ -77,7 +77,9 @@ class VisualOdometryNodelet : public RobotNodelet {
     if (options_.awaitsMotion() && options_.guess_frame_id.empty())
       throw std::invalid_argument("guess_min_translation and guess_min_rotation need guess_frame_id: set it, too");
     checkFrames();
-    for (std::string* frame : {&options_.odom_frame_id, &options_.base_frame_id, &options_.guess_frame_id})
+    if (options_.ground_truth_base_frame_id.empty()) options_.ground_truth_base_frame_id = options_.base_frame_id;
+    for (std::string* frame : {&options_.odom_frame_id, &options_.base_frame_id, &options_.guess_frame_id,
+                               &options_.ground_truth_frame_id, &options_.ground_truth_base_frame_id})
       *frame = cleanFrameId(*frame);
     T_odom_start_ = ros_conversions::toPose(options_.initial_pose);
     odometry_ = std::make_unique<VisualOdometry>(reconfigured_);
@@ -85,6 +87,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     publisher_ = std::make_unique<OdometryPublisher>(nh_, options_, tag);
     publisher_->restart(T_odom_start_);
     to_be_levelled_ = options_.use_imu;
+    starts_at_truth_ = !options_.ground_truth_frame_id.empty();
     transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), tag,
                                                     [this](const std::string& what) { SDVO_WARN(what, what); });
     mount_ = std::make_unique<CameraMount>(*transforms_, options_.tf_timeout);
@@ -143,6 +146,10 @@ class VisualOdometryNodelet : public RobotNodelet {
   void checkFrames() const {
     ros_conversions::requireTwoFrames({"odom_frame_id", options_.odom_frame_id},
                                       {"base_frame_id", options_.base_frame_id});
+    if (!options_.ground_truth_frame_id.empty() && options_.ground_truth_base_frame_id.empty() && options_.publish_tf)
+      throw std::invalid_argument("on TF base_frame_id is below odom_frame_id, not below ground_truth_frame_id: set "
+                                  "ground_truth_base_frame_id to the frame that has the base's true pose, or "
+                                  "publish_tf to false");
     if (options_.guess_frame_id.empty()) return;
     ros_conversions::requireTwoFrames({"guess_frame_id", options_.guess_frame_id},
                                       {"base_frame_id", options_.base_frame_id});
@@ -284,6 +291,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
     features.stamp += time_shift_;
     std::string problem = findExtrinsic(cleanFrameId(message.header.frame_id));
+    if (problem.empty() && starts_at_truth_ && !given_start_) problem = startAtTruth(message.header.stamp);
     if (problem.empty() && to_be_levelled_ && !given_start_) problem = level();
     const OdometryResult result = problem.empty() ? track(features, message, guess) : waitFor(problem);
     publisher_->publishPoints(passed.item.view);
@@ -335,6 +343,10 @@ class VisualOdometryNodelet : public RobotNodelet {
     T_guess_processed_.reset();
     if (options_.awaitsMotion() && result.state == TrackingState::kTracking) T_guess_processed_ = T_guess_base;
     publisher_->publish(result, *mount_->last(), T_guess_base);
+    publisher_->publishErrors([this](const ros::Time& stamp) {
+      std::string ignored;
+      return truthAt(stamp, ignored);
+    });
     if (publisher_->wantsMap() && result.has_pose)
       publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
     return result;
@@ -416,6 +428,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     optical_found_ = gyro_found_ = mount_found_ = {};
     publisher_->restart(T_odom_start);
     given_start_ = given.has_value();
+    starts_at_truth_ = !options_.ground_truth_frame_id.empty();
     levels_until_.reset();
     processed_epoch_.reset();
     processed_stamp_.reset();
@@ -492,6 +505,21 @@ class VisualOdometryNodelet : public RobotNodelet {
     } else {
       NODELET_WARN_STREAM("roll and pitch of the first pose are those of initial_pose: " << problem);
     }
+    return "";
+  }
+
+  std::optional<Eigen::Isometry3d> truthAt(const ros::Time& stamp, std::string& problem) const {
+    return transforms_->find(options_.ground_truth_frame_id, options_.ground_truth_base_frame_id, problem, stamp);
+  }
+
+  /// Takes the first pose from the truth, for which it waits. Returns what is missing; empty when done.
+  std::string startAtTruth(const ros::Time& stamp) {
+    std::string problem;
+    const auto T_odom_base = truthAt(stamp, problem);
+    if (!T_odom_base) return "the first pose is that of ground_truth_frame_id: " + problem;
+    starts_at_truth_ = to_be_levelled_ = false;
+    T_odom_start_ = *T_odom_base;
+    publisher_->restart(T_odom_start_);
     return "";
   }
 
@@ -609,7 +637,8 @@ class VisualOdometryNodelet : public RobotNodelet {
   bool rests_ = false;                                  // the input
   ros::Time corrected_at_;                              // while it rests; TF takes a stamp once
   ros::WallTimer rest_timer_;
-  bool to_be_levelled_ = false;  // T_odom_start_ still needs the accelerometer
+  bool to_be_levelled_ = false;   // T_odom_start_ still needs the accelerometer
+  bool starts_at_truth_ = false;  // … the truth
   bool latency_reported_ = false;
   bool base_is_camera_ = false;         // the base has optical axes, those of odom are REP-105's
   bool given_start_ = false;            // a service has set the pose, which is not levelled

@@ -21,6 +21,8 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
   constexpr int kQueue = 10;
   odom_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", kQueue);
   pose_publisher_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kQueue);
+  if (!options_.ground_truth_frame_id.empty())
+    error_publisher_ = nh.advertise<geometry_msgs::PoseStamped>("ground_truth_error", kQueue);
   map_publisher_ = nh.advertise<sensor_msgs::PointCloud2>("map_points", 1);
   // Whoever comes late gets the path, too.
   path_publisher_ = nh.advertise<nav_msgs::Path>("path", 1, [this](const ros::SingleSubscriberPublisher&) {
@@ -61,6 +63,24 @@ void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isome
   pose->pose = odometry->pose;
   pose_publisher_.publish(pose);
   extendPath(*odometry);
+  if (error_publisher_) without_truth_.push_back({stamp, odometry->pose.pose});
+}
+
+void OdometryPublisher::publishErrors(const std::function<std::optional<Eigen::Isometry3d>(const ros::Time&)>& truth) {
+  while (!without_truth_.empty()) {
+    const auto T_odom_base = truth(without_truth_.front().stamp);
+    if (!T_odom_base && without_truth_.size() <= kMostWithoutTruth) return;
+    if (T_odom_base) {
+      Eigen::Isometry3d T_odom_found;
+      tf2::fromMsg(without_truth_.front().pose, T_odom_found);
+      geometry_msgs::PoseStamped error;
+      error.header.stamp = without_truth_.front().stamp;
+      error.header.frame_id = frames_.base;
+      error.pose = tf2::toMsg(T_odom_base->inverse() * T_odom_found);
+      error_publisher_.publish(error);
+    }
+    without_truth_.pop_front();
+  }
 }
 
 void OdometryPublisher::sendCorrection(const ros::Time& stamp) {
@@ -108,6 +128,7 @@ void OdometryPublisher::publishPoints(const StereoFeaturesView& features) {
 void OdometryPublisher::restart(const Eigen::Isometry3d& T_odom_start) {
   moveTo(T_odom_start);
   T_odom_guess_.reset();
+  without_truth_.clear();
   const std::lock_guard<std::mutex> lock(path_mutex_);
   if (!path_.empty()) path_changed_ = true;
   path_.clear();

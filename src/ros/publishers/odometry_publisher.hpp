@@ -6,6 +6,8 @@
 
 #include <atomic>
 #include <boost/circular_buffer.hpp>
+#include <deque>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -17,7 +19,7 @@
 
 namespace sdvo {
 
-/// Publishes odom, pose, TF, points, map_points, feature_flow and vo_info of each pair, and once a second the path,
+/// Publishes odom, pose, TF, ground_truth_error, points, map_points, feature_flow and vo_info of each pair, and once a second the path,
 /// which is long.
 class OdometryPublisher {
  public:
@@ -28,6 +30,9 @@ class OdometryPublisher {
   /// odometry of guess_frame_id, where it is known.
   void publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
                const std::optional<Eigen::Isometry3d>& T_guess_base = std::nullopt);
+  /// Errors of the last poses, whose truth may come later than they do. `truth`: T_odom_base at a time, where it is
+  /// known.
+  void publishErrors(const std::function<std::optional<Eigen::Isometry3d>(const ros::Time&)>& truth);
   /// odom -> guess_frame_id as at the last pose, where TF gets it: meanwhile the other odometry carries the base.
   void sendCorrection(const ros::Time& stamp);
   /// Fills in header, session and latency; returns what was published.
@@ -56,18 +61,20 @@ class OdometryPublisher {
     geometry_msgs::Pose pose;
   };
 
-  static constexpr double kPathPeriod = 1.0;  // s of wall time
+  static constexpr double kPathPeriod = 1.0;              // s of wall time
+  static constexpr std::size_t kMostWithoutTruth = 10;    // poses (chosen)
 
   void extendPath(const nav_msgs::Odometry& odometry);
 
   OdometryOutputOptions options_;
   ros_conversions::OdometryFrames frames_;
   const ros::Time session_;
-  ros::Publisher odom_publisher_, pose_publisher_, map_publisher_, path_publisher_, info_publisher_, points_publisher_,
+  ros::Publisher odom_publisher_, pose_publisher_, error_publisher_, map_publisher_, path_publisher_, info_publisher_, points_publisher_,
       flow_publisher_;
   TransformPublisher transform_publisher_;
   Eigen::Isometry3d T_odom_start_ = Eigen::Isometry3d::Identity();
   std::optional<Eigen::Isometry3d> T_odom_guess_;  ///< at the last pose
+  std::deque<PathPose> without_truth_;             ///< the last poses
   mutable std::mutex path_mutex_;
   boost::circular_buffer<PathPose> path_;
   std::atomic<bool> path_changed_{false};  ///< since it was published
