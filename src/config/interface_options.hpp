@@ -140,11 +140,10 @@ struct OdometryOutputOptions {
     list.add("guess_min_time", guess_min_time, {0.0, 3600.0}, "s",
              "a pair that is so much later than the last one is not left out; 0: no such limit");
     list.add("ground_truth_frame_id", ground_truth_frame_id,
-             "world-fixed frame of the true pose on TF, of motion capture or a simulator: the odometry starts at the "
-             "base's pose there, and topic ground_truth_error has the error; empty: none");
+             "world-fixed frame of the base's true pose on TF: the odometry starts there, and topic ground_truth_error "
+             "has its error; empty: none");
     list.add("ground_truth_base_frame_id", ground_truth_base_frame_id,
-             "the base's frame below ground_truth_frame_id, which base_frame_id with two parents cannot be; empty: "
-             "base_frame_id");
+             "the base below ground_truth_frame_id, as a frame on TF has one parent; empty: base_frame_id");
     list.add("guess_timeout", guess_timeout, {0.0, 1.0}, "s",
              "wall time to wait for either at each pair; seldom once it did not come in time");
     list.add("queue_size", queue_size, {1, 1000}, "",

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The recipes for robot_localization in docs/robot.md, tried on the launched pipeline: a filter of this file takes their YAML
+"""The recipes for robot_localization in docs/fusing.md, tried on the launched pipeline: a filter of this file takes their YAML
 as that package's EKF does, for Debian has none."""
 
 import os
@@ -29,7 +29,7 @@ LEAST = 1e-9  # variance
 
 
 def recipes():
-    with open(os.path.join(roslib.packages.get_pkg_dir(PACKAGE), 'docs', 'robot.md')) as page:
+    with open(os.path.join(roslib.packages.get_pkg_dir(PACKAGE), 'docs', 'fusing.md')) as page:
         texts = re.findall(r'```yaml\n(.*?)```', page.read(), re.DOTALL)
     return [yaml.safe_load(text) for text in texts if 'odom0_config' in text]
 
