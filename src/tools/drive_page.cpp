@@ -216,7 +216,10 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
       verdict.what +=
           "; random errors of about " + percent(implied) + " of the distance, beside those of the calibration";
   }
-  if (worst.finding.isFault()) verdict.what += ". Camera: " + worst.text();
+  if (worst.finding.isFault()) {
+    verdict.what += ". Camera: " + worst.text();
+    verdict.remedy = worst.finding.remedy;
+  }
   return verdict;
 }
 

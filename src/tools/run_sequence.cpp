@@ -293,7 +293,7 @@ int run(const Arguments& arguments) {
   if (!arguments.output.empty()) writeResults(drive, checks, options, arguments);
   if (!seen) return 0;
   const Finding verdict = makePage(*recording, drive, *seen, checks, options, arguments);
-  std::cout << toString(verdict.verdict) << ": " << verdict.what << "\npage: " << arguments.page << "\n";
+  std::cout << toString(verdict.verdict) << ": " << verdict.text() << "\npage: " << arguments.page << "\n";
   return exitCodeOf(verdict.verdict);
 }
 

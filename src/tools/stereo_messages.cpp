@@ -94,6 +94,18 @@ std::uint64_t placeOfIndex(const std::string& path) {
   return place;
 }
 
+/// Of the topics of a type, compressed or not.
+std::string namesOf(const ros::master::V_TopicInfo& topics, const std::string& type) {
+  std::set<std::string> names;
+  for (const ros::master::TopicInfo& topic : topics)
+    if (const std::string found = topic.datatype.substr(topic.datatype.rfind('/') + 1);
+        found == type || found == "Compressed" + type)
+      names.insert(topic.name);
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return all.empty() ? "none" : all;
+}
+
 /// Usual names of raw images.
 const std::vector<std::string> kRawImages = {"image_raw", "image_mono", "image", "image_color"};
 
@@ -106,6 +118,7 @@ void StereoSource::addTo(CLI::App& app) {
   app.add_option("--image", image,
                  "topics: name of the images, such as image_rect_raw; without 'rect' in it they are raw, and rectified")
       ->capture_default_str();
+  app.add_option("--images", images, "topics: images of left and right, in place of the four names above")->expected(2);
   app.add_option("--infos", infos, "topics: camera_info of left and right, where they are not beside the images")
       ->expected(2);
   app.add_option("--calibration", calibration,
@@ -125,11 +138,13 @@ std::string StereoSource::folder() const {
 }
 
 StereoTopics StereoSource::topics() const {
-  const std::string of_left = folder() + left + "/", of_right = folder() + right + "/";
-  if (calibration.empty())
-    return {of_left + image, of_right + image, infos.empty() ? of_left + "camera_info" : infos.front(),
-            infos.empty() ? of_right + "camera_info" : infos.back()};
-  return {of_left + image, of_right + image, calibration.front(), calibration.back()};
+  StereoTopics topics{folder() + left + "/" + image, folder() + right + "/" + image, "", ""};
+  if (!images.empty()) topics = {images.front(), images.back(), "", ""};
+  const std::vector<std::string>& named = calibration.empty() ? infos : calibration;
+  for (const std::size_t side : {0u, 1u})
+    topics[side + 2] = !named.empty() ? (side == 0 ? named.front() : named.back())
+                                      : topics[side].substr(0, topics[side].rfind('/') + 1) + "camera_info";
+  return topics;
 }
 
 StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
@@ -165,13 +180,9 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
   const std::string path = bag.getFileName();
   for (const std::size_t input : {0u, 1u}) {
     if (isAmong(imagined, topics[input])) continue;
-    std::set<std::string> names;
-    for (std::size_t i = 0; i < imagined.size(); i += 2) names.insert(imagined[i].name);
-    std::string images;
-    for (const std::string& name : names) images += (images.empty() ? "" : ", ") + name;
-    throw std::runtime_error("'" + path + "' has no " + topics[input] +
-                             "; its images: " + (images.empty() ? "none" : images) +
-                             ": name the topics by --camera, --left, --right, --image");
+    throw std::runtime_error("'" + path + "' has no " + topics[input] + "; its images: " + namesOf(recorded, "Image") +
+                             ": name the left and the right one by --images, their camera_info (" +
+                             namesOf(recorded, "CameraInfo") + ") by --infos");
   }
   for (const std::size_t input : {2u, 3u})  // as stereo_raw.launch records it where it is given a field of view
     if (const std::string of_fov = topics[input].substr(0, topics[input].rfind('/') + 1) + "rectifiable/camera_info";
@@ -180,9 +191,9 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
   for (const std::size_t input : {2u, 3u})
     if (source.calibration.empty() && !isAmong(recorded, topics[input]))
       throw std::runtime_error("'" + path + "' has images on " + topics[0] + " and " + topics[1] + ", but no " +
-                               topics[input] +
-                               ": the calibration is missing. Give it: --calibration camchain.yaml (Kalibr's), or "
-                               "--calibration left.yaml right.yaml (camera_info and others: docs/tools.md)");
+                               topics[input] + " (camera_info: " + namesOf(recorded, "CameraInfo") +
+                               "): name those of left and right by --infos, or give --calibration camchain.yaml "
+                               "(Kalibr's), or --calibration left.yaml right.yaml (docs/tools.md)");
   for (const std::size_t input : {0u, 1u})
     if (rosbag::View(bag, rosbag::TopicQuery(topics[input])).size() == 0) topics[input] += "/compressed";
   return topics;

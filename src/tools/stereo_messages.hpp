@@ -29,6 +29,7 @@ struct StereoSource {
   std::string camera = "/stereo", left = "left", right = "right", image = "image_rect";
   std::vector<std::string> calibration;  ///< files of readCalibration() in place of camera_info; none: camera_info
   double fov = 0.0;                      ///< of raw images once they are rectified, deg; 0: as calibrated
+  std::vector<std::string> images;       ///< topics, left and right; none: by the names above
   std::vector<std::string> infos;        ///< topics of camera_info, left and right; none: beside the images
   PairingOptions pairing;
   double rate = 0.0;                     ///< of a folder's pairs, Hz; 0: as its file of times says

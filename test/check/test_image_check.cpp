@@ -73,8 +73,7 @@ TEST(ImageCheck, TextureIsCornersThatAreFoundInBothImages) {
     report.detected = corners, report.stereo_matched = matched;
     return checked(report).texture(100, 0.5);
   };
-  expectSaid(texture(100, 50), Verdict::kOk,
-             "100 corners (median), 90 % of the pairs have 100 or more; 50 % are found");
+  expectSaid(texture(100, 50), Verdict::kOk, "100 corners");
   expectSaid(texture(99, 90), Verdict::kFail, "scene with texture");
   expectSaid(texture(100, 49), Verdict::kWarn, "max_disparity");
   expectSaid(texture(0, 0), Verdict::kFail, "0 % are found");

@@ -2,6 +2,7 @@
 
 #include "../../src/check/row_check.hpp"
 #include "../synthetic_scene.hpp"
+#include "../said.hpp"
 
 namespace sdvo::test_row_check {
 
@@ -105,8 +106,8 @@ TEST(CheckMoment, NamesWhatIsProvedAndNothingElse) {
   for (const RowDelay::Estimate& right : {RowDelay::Estimate{kUnknown, kUnknown}, {0.0005, 0.0001}, {0.02, 0.02}})
     EXPECT_EQ(checkMoment(right).verdict, Verdict::kOk) << "less than matters, or within chance";
   EXPECT_EQ(checkMoment({-0.0062, 0.0001}).verdict, Verdict::kWarn);
-  EXPECT_EQ(checkMoment({-0.0062, 0.0001}).what, "right images are taken 6.2 +- 0.1 ms before left ones");
-  EXPECT_EQ(checkMoment({0.0162, 0.0001}).what, "right images are taken 16.2 +- 0.1 ms after left ones");
+  expectWords(checkMoment({-0.0062, 0.0001}).text(), {"6.2 +- 0.1 ms before", "right_delay"});
+  expectWords(checkMoment({0.0162, 0.0001}).what, {"16.2 +- 0.1 ms after"});
   EXPECT_EQ(checkMoment({0.0162, 0.0001}).verdict, Verdict::kFail);
 }
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "../../src/common/imu_tracks.hpp"
+#include "../said.hpp"
 
 namespace sdvo::test_gravity_track {
 
@@ -50,11 +51,11 @@ TEST(GravityTrack, SaysNothingOfASensorThatMovesAndNamesTheCause) {
   };
   EXPECT_EQ(cause(nothing), "no acceleration has come");
   nothing.add(0, {0.0, 0.0, 9.81}, kStill);
-  EXPECT_EQ(cause(nothing), "less than a second of accelerations has come");
-  EXPECT_EQ(cause(turns), "the robot turns, by 0.3 rad/s: start while it stands");
-  EXPECT_EQ(cause(shakes), "the robot shakes or accelerates: start while it stands");
-  EXPECT_EQ(cause(in_g), "|acceleration| = 1.0: is it in g? sensor_msgs/Imu wants m/s^2");
-  EXPECT_EQ(cause(free_of_gravity), "|acceleration| = 0.0 m/s^2 is not that of gravity, 9.8");
+  expectWords(cause(nothing), {"less than a second"});
+  expectWords(cause(turns), {"turns", "0.3 rad/s", "while it stands"});
+  expectWords(cause(shakes), {"shakes", "while it stands"});
+  expectWords(cause(in_g), {"in g", "m/s^2"});
+  expectWords(cause(free_of_gravity), {"0.0 m/s^2", "gravity"});
   for (const GravityTrack* track : {&accelerates, &is_broken}) EXPECT_NE(cause(*track), "");
 }
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "../../src/common/imu_tracks.hpp"
+#include "../said.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo::test_gyro_track {
@@ -65,11 +66,9 @@ TEST(GyroTrack, NamesTheCause) {
   EXPECT_EQ(cause(0, 0), "no rate has come");
   fill(track, 1000, 1100);
   fill(track, 1200, 1300);
-  EXPECT_EQ(cause(1250, 1800),
-            "its newest rate is 0.500 s older than the image: does it come late, or by another clock?");
-  EXPECT_EQ(cause(700, 1250),
-            "its oldest rate is 0.300 s newer than the image before: did it just start, or is its clock another one?");
-  EXPECT_EQ(cause(1050, 1250), "a pause of 0.100 s between two of its rates");
+  expectWords(cause(1250, 1800), {"newest", "0.500 s older", "late", "clock"});
+  expectWords(cause(700, 1250), {"oldest", "0.300 s newer", "start", "clock"});
+  expectWords(cause(1050, 1250), {"pause of 0.100 s"});
 }
 
 TEST(GyroTrack, BeginsAnewWhenTheClockJumpsBack) {

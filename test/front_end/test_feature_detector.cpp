@@ -102,9 +102,8 @@ TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
   const auto errorWith = [&](const cv::Mat& mask) {
     return errorOf([&] { FeatureDetector({}).detect(image, 0, mask); });
   };
-  EXPECT_EQ(errorWith(cv::Mat::zeros(100, 200, CV_8U)),
-            "the mask is 200x100, the left image is 600x400: make it of the rectified left image");
-  EXPECT_EQ(errorWith(cv::Mat::zeros(image.size(), CV_8UC3)), "the mask must have one channel of eight bits");
+  expectWords(errorWith(cv::Mat::zeros(100, 200, CV_8U)), {"200x100", "600x400", "rectified left image"});
+  expectWords(errorWith(cv::Mat::zeros(image.size(), CV_8UC3)), {"mask", "one channel"});
 
   const TemporaryFolder folder;
   const std::string pipe = (folder.path() / "pipe").string(), png = (folder.path() / "mask.png").string();
@@ -113,9 +112,9 @@ TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
     options.mask = file;
     return errorOf([&] { FeatureDetector{options}; });
   };
-  EXPECT_EQ(errorOfFile("/nowhere/mask.png"), "mask: cannot read a PNG from '/nowhere/mask.png'");
+  expectWords(errorOfFile("/nowhere/mask.png"), {"mask", "PNG", "'/nowhere/mask.png'"});
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_EQ(errorOfFile(pipe), "mask: cannot read a PNG from '" + pipe + "'");
+  expectWords(errorOfFile(pipe), {"mask", "PNG", pipe});
   // The header alone, of a huge one and of one that ends early.
   cv::imwrite(png, maskUpTo(10));
   std::fstream stream(png, std::ios::in | std::ios::out | std::ios::binary);

@@ -76,15 +76,14 @@ TEST(PoseConversions, FullyCorrelatedAxesAreTaken) {
 TEST(PoseConversions, RefusalsSayWhichElementToChange) {
   Matrix6d wrong = planar();
   wrong(5, 5) = -1.0;
-  EXPECT_EQ(refusal(wrong),
-            "the covariance's variance of yaw is negative: send it in m^2 or rad^2, 0 for 1 mm or 1 mrad");
+  expectWords(refusal(wrong), {"variance of yaw is negative", "m^2 or rad^2"});
   wrong(5, 5) = 1e300;
   EXPECT_TRUE(contains(refusal(wrong), "variance of yaw is beyond 1e16"));
   wrong(5, 5) = 1e9;
   EXPECT_EQ(refusal(wrong), "") << "for what is not known";
   wrong = planar();
   wrong(0, 1) = std::nan("");
-  EXPECT_EQ(refusal(wrong), "the covariance of y and x is not finite: send a number, 0 if it is not known");
+  expectWords(refusal(wrong), {"covariance of y and x is not finite", "0 if it is not known"});
   wrong = planar();
   wrong(0, 1) = wrong(1, 0) = 0.3;
   EXPECT_TRUE(contains(refusal(wrong), "covariance of y and x exceeds what their variances allow"));

@@ -568,7 +568,7 @@ TEST_F(Tools, RawBagsAreRectified) {
            std::vector<std::pair<std::string, std::string>>{{"run_sequence", bare + " --poses " + in("poses.txt")},
                                                             {"check_camera", "--bag " + bare},
                                                             {"convert", bare + " --output " + folder}}) {
-        expectError(run(tool, arguments), "no /cam0/camera_info: the calibration is missing");
+        expectError(run(tool, arguments), "no /cam0/camera_info");
         const Outcome given = run(tool, arguments + sensors + fov);
         EXPECT_NE(given.exit_code, 1) << given.err;
       }
