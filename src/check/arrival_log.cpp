@@ -11,13 +11,13 @@
 namespace sdvo {
 namespace {
 
-constexpr double kMost = 200.0;    // arrivals a second on each topic (chosen): more are no camera's
-constexpr double kLately = 5.0;    // s, of losses and rates
-constexpr double kPatience = 1.0;  // s beyond the longest wait of a pair so far
-constexpr double kLate = 0.1;      // s between messages of one stamp (chosen): a queue is too short, perhaps
-constexpr double kHalf = 0.45;     // ratio of a period: images of one pair are nearer; below 0.5, for jitter
+constexpr double kFastest = 200.0;   // arrivals a second on each topic (chosen): more are no camera's
+constexpr double kLately = 5.0;      // s, of losses and rates
+constexpr double kPatience = 1.0;    // s beyond the longest wait of a pair so far
+constexpr double kLate = 0.1;        // s between messages of one stamp (chosen): a queue is too short, perhaps
+constexpr double kHalf = 0.45;       // ratio of a period: images of one pair are nearer; below 0.5, for jitter
 constexpr double kOtherClock = 1.0;  // s between stamps and arrivals (chosen): no camera takes as long
-constexpr double kFewLost = 0.02;  // ratio of pairs (chosen): drivers lose one now and then
+constexpr double kFewLost = 0.02;    // ratio of pairs (chosen): drivers lose one now and then
 
 constexpr const char* kNoPairs = "no pairs";
 constexpr const char* kTrigger = "trigger both cameras together, and stamp each image with its own time";
@@ -52,7 +52,7 @@ void ArrivalLog::note(Input input, std::int64_t stamp, double now) {
     if (std::none_of(topics_.begin(), topics_.end(), is_silent))
       for (const Topic& topic : topics_) first_stamp_ = std::max(first_stamp_, topic.arrivals.front().stamp);
   }
-  while (static_cast<double>(arrivals.size()) > kMost * memory_ || arrivals.front().now < now - memory_) {
+  while (static_cast<double>(arrivals.size()) > kFastest * memory_ || arrivals.front().now < now - memory_) {
     if (arrivals.front().fate == Fate::kWaits) giveUp(input, arrivals.front());
     arrivals.pop_front();
   }
@@ -233,7 +233,7 @@ Finding ArrivalLog::checkStamps() const {
 
   if (*std::min_element(periods.begin(), periods.end()) <= 0.0)
     return {Verdict::kWarn, "stamps fall; " + what, "one recording at a time, and a driver that does not restart"};
-  if (const Finding clock = checkLatency(delay, kOtherClock, "arrival", kOtherClock); clock.isFault()) return clock;
+  if (Finding clock = checkLatency(delay, kOtherClock, "arrival", kOtherClock); clock.isFault()) return clock;
   if (alone > kFewLost) {
     const std::string cause = advise(-std::numeric_limits<double>::infinity());
     return {Verdict::kWarn, what, cause.empty() ? std::string(kTrigger) + ", or " + kLosses : cause.substr(2)};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -16,11 +17,20 @@
 #include "mosaic_check.hpp"
 #include "mount_check.hpp"
 #include "odometry_check.hpp"
-#include "recorded_pair.hpp"
 #include "row_check.hpp"
 #include "work_load.hpp"
 
 namespace sdvo {
+
+/// A rectified pair of a recording.
+struct RecordedPair {
+  StereoCamera camera;
+  cv::Mat left, right;      ///< CV_8U grey; valid as long as the call that it is given to
+  std::int64_t stamp;       ///< ns
+  std::string lens;         ///< the calibration's model in words; empty: unknown
+  std::string unrectified;  ///< evidence that the images are not rectified; empty: none
+  double right_delay = 0.0;  ///< s, of the right image by its stamp, where approximate_sync pairs them
+};
 
 /// All steps of the check of a stereo camera. Each step relies on those before it.
 class CameraCheck {

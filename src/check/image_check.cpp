@@ -160,9 +160,9 @@ Finding ImageCheck::exposure(double min_intensity, double max_intensity) const {
 
 Finding ImageCheck::texture(int min_corners, double min_share) const {
   const double few = quantile(corners_, 0.1), share = quantile(matched_, 0.5);
-  const Finding usual = checkCorners(quantile(corners_, 0.5), min_corners,
-                                     text(0, " (median), 90 % of the pairs have ", few, " or more; ", 100.0 * share,
-                                          " % are found in the right image"));
+  Finding usual = checkCorners(quantile(corners_, 0.5), min_corners,
+                               text(0, " (median), 90 % of the pairs have ", few, " or more; ", 100.0 * share,
+                                    " % are found in the right image"));
   if (usual.isFault()) return usual;
   if (few < min_corners) return {Verdict::kWarn, usual.what, "some views have hardly any texture"};
   return judged(false, share < min_share, usual.what,

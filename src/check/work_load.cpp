@@ -1,5 +1,6 @@
 #include "work_load.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace sdvo {
@@ -11,6 +12,20 @@ constexpr const char* kRelief = "set fewer detector/max_features, take smaller i
 
 Finding checkLoad(double load, double most, const std::string& more) {
   return judged(false, load > most, text(0, 100.0 * load, " % of one processor's time") + more, kRelief);
+}
+
+void WorkLoad::noteWait(const std::string& what, double time) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  wait_ += time;
+  if (time > longest_wait_) awaited_ = what;
+  longest_wait_ = std::max(longest_wait_, time);
+}
+
+void WorkLoad::note(double time, double busy) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  time_ += time;
+  busy_ += busy;
+  ++items_;
 }
 
 Findings WorkLoad::judge(Values& values) {

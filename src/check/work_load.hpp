@@ -2,7 +2,6 @@
 
 #include <time.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <mutex>
@@ -50,12 +49,7 @@ class WorkLoad {
   };
 
   /// Time (s) that the thread waited for `what` during an item.
-  void noteWait(const std::string& what, double time) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    wait_ += time;
-    if (time > longest_wait_) awaited_ = what;
-    longest_wait_ = std::max(longest_wait_, time);
-  }
+  void noteWait(const std::string& what, double time);
 
   /// Items that were dropped since the start because the thread was busy.
   void noteDropped(std::uint64_t dropped) {
@@ -74,12 +68,7 @@ class WorkLoad {
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
   }
 
-  void note(double time, double busy) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    time_ += time;
-    busy_ += busy;
-    ++items_;
-  }
+  void note(double time, double busy);
 
   const double max_load_;
   std::mutex mutex_;

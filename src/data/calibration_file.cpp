@@ -76,6 +76,21 @@ struct RectifiedView {
   std::vector<double> P;
 };
 
+/// Names of its entries; an empty `model` is plumb_bob.
+struct ViewNames {
+  std::string width, height, K, model, D, R, P;
+};
+
+RectifiedView readView(const Node& node, const ViewNames& names) {
+  RectifiedView view;
+  view.raw.size = {read<int>(node, names.width), read<int>(node, names.height)};
+  view.raw.K = readMatrix(node, names.K);
+  view.raw.setLens(names.model.empty() ? "plumb_bob" : read<std::string>(node, names.model), numbers(node, names.D));
+  view.R = readMatrix(node, names.R);
+  view.P = numbers(node, names.P, {12});
+  return view;
+}
+
 StereoRectification ofViews(const std::array<RectifiedView, 2>& views, double fov) {
   const auto& [left, right] = views;
   for (const std::size_t i : {0u, 2u, 5u, 6u})
@@ -135,33 +150,19 @@ StereoRectification readSensors(const Nodes& files, double fov, cv::Size) {
 // ROS
 
 StereoRectification readInfos(const Nodes& files, double fov, cv::Size) {
-  std::array<RectifiedView, 2> views;
-  for (std::size_t side : {0u, 1u}) {
-    const Node& info = files[side];
-    RectifiedView& view = views[side];
-    view.raw.size = {read<int>(info, "image_width"), read<int>(info, "image_height")};
-    view.raw.K = readMatrix(info, "camera_matrix");
-    view.raw.setLens(read<std::string>(info, "distortion_model"), numbers(info, "distortion_coefficients"));
-    view.R = readMatrix(info, "rectification_matrix");
-    view.P = numbers(info, "projection_matrix", {12});
-  }
-  return ofViews(views, fov);
+  const ViewNames names{"image_width",      "image_height",          "camera_matrix",
+                        "distortion_model", "distortion_coefficients", "rectification_matrix",
+                        "projection_matrix"};
+  return ofViews({readView(files[0], names), readView(files[1], names)}, fov);
 }
 
 /// A message of camera_info as rostopic or ros2 prints it.
 StereoRectification readMessages(const Nodes& files, double fov, cv::Size) {
-  std::array<RectifiedView, 2> views;
-  for (std::size_t side : {0u, 1u}) {
-    const Node& info = files[side];
-    const auto name = [&](const char* upper, const char* lower) { return has(info, upper) ? upper : lower; };
-    RectifiedView& view = views[side];
-    view.raw.size = {read<int>(info, "width"), read<int>(info, "height")};
-    view.raw.K = readMatrix(info, name("K", "k"));
-    view.raw.setLens(read<std::string>(info, "distortion_model"), numbers(info, name("D", "d")));
-    view.R = readMatrix(info, name("R", "r"));
-    view.P = numbers(info, name("P", "p"), {12});
-  }
-  return ofViews(views, fov);
+  const auto view = [](const Node& info) {
+    return has(info, "K") ? readView(info, {"width", "height", "K", "distortion_model", "D", "R", "P"})
+                          : readView(info, {"width", "height", "k", "distortion_model", "d", "r", "p"});
+  };
+  return ofViews({view(files[0]), view(files[1])}, fov);
 }
 
 /// Videre's text, of one or both cameras: sections of [image] and [NAME], and numbers below the names of matrices.
@@ -245,16 +246,10 @@ StereoRectification readOpenCv(const Nodes& files, double fov, cv::Size images) 
 // ORB-SLAM
 
 StereoRectification readOrbSlam2(const Nodes& files, double fov, cv::Size) {
-  std::array<RectifiedView, 2> views;
-  for (std::size_t side : {0u, 1u}) {
-    const std::string of = side == 0 ? "LEFT." : "RIGHT.";
-    views[side].raw.size = {read<int>(files[0], of + "width"), read<int>(files[0], of + "height")};
-    views[side].raw.K = readMatrix(files[0], of + "K");
-    views[side].raw.setLens("plumb_bob", numbers(files[0], of + "D"));
-    views[side].R = readMatrix(files[0], of + "R");
-    views[side].P = numbers(files[0], of + "P", {12});
-  }
-  return ofViews(views, fov);
+  const auto view = [&](const std::string& of) {
+    return readView(files[0], {of + "width", of + "height", of + "K", "", of + "D", of + "R", of + "P"});
+  };
+  return ofViews({view("LEFT."), view("RIGHT.")}, fov);
 }
 
 /// A camera of ORB-SLAM's or VINS' keys: fx, fy, cx, cy, and those of its coefficients that there are.

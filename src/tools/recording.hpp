@@ -9,8 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "../check/arrival_log.hpp"
-#include "../check/recorded_pair.hpp"
+#include "../check/camera_check.hpp"
 #include "stereo_messages.hpp"
 
 namespace sdvo {
