@@ -952,8 +952,8 @@ TEST_F(Tools, TheBaseIsThatOfTheOdometryAboveTheCamera) {
   };
   check({"r1/base", "r2/base"}, "", "m of r2/base and looks along 1.00");
   check({}, " --base-frame r2/base", "m of r2/base and looks along 1.00");
-  check({"r1/base", "r2/base"}, " --base-frame r1/base", "to r1/base: ");
-  check({"r1/base"}, "", "to base_link: ");
+  check({"r1/base", "r2/base"}, " --base-frame r1/base", "to base frame 'r1/base'");
+  check({"r1/base"}, "", "to base frame 'base_link'");
 }
 
 TEST_F(Tools, PicturesOfEachPair) {
