@@ -41,7 +41,8 @@ Finding OdometryCheck::shutter() const {
   return judged(false, readout->isRolling(),
                 text(1, "last row ", 1e3 * std::abs(readout->value), " +- ", 1e3 * readout->sigma, " ms ",
                      readout->value > 0.0 ? "after" : "before", " the first"),
-                "a rolling shutter: set calibration/readout, or take cameras with a global one");
+                text(4, "a rolling shutter: set calibration/readout to ", readout->value,
+                     ", or take cameras with a global one"));
 }
 
 }  // namespace sdvo

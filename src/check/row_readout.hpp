@@ -1,40 +1,60 @@
 #pragma once
 
+#include <Eigen/Geometry>
+#include <cmath>
+#include <deque>
 #include <optional>
+#include <vector>
 
 #include "../rig/row_delay.hpp"
-#include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 
 namespace sdvo {
 
 /// Readout time of a rolling shutter, from the first row to the last. While the camera turns, each row has another
-/// pose: a point v px below the middle is shifted by its image velocity * readout * v / height. A motion explains part
-/// of the shift, and at constant velocity other positions of the points explain all of it. So only changes of the
-/// velocity are used, and the estimate is a lower bound.
+/// pose: a point is shifted by its image velocity * readout * its row's part of the height. Each pair's pose is fitted
+/// and eliminated, so only changes of the rate and of rows show it. Rates at the stamps follow from the mean rates of
+/// the motions around them. A tremor that is faster than pairs makes them err: slow rates are the instrument (Wright
+/// 1928).
 class RowReadout {
  public:
-  /// s. Estimates for global shutters are up to 2 ms (MH_01); a readout of 3 ms causes position errors of 5 sigma.
+  /// s; a readout of 3 ms causes position errors of 5 sigma.
   static constexpr double kWarn = 0.003;
 
   struct Estimate {
     double value, sigma;  ///< s
 
-    bool isRolling() const { return value > kWarn && value * value > RowDelay::kSquare * sigma * sigma; }
+    bool isRolling() const { return std::abs(value) > kWarn && value * value > RowDelay::kSquare * sigma * sigma; }
   };
 
-  /// Adds a pair with a measured motion. Uses the vertical and horizontal residuals of its matches.
+  /// Adds a pair. All pairs of a drive must be given in turn.
   void add(const StereoFeatures& features, const OdometryResult& result);
 
   std::optional<Estimate> estimate() const;
 
  private:
-  double information_ = 0.0, product_ = 0.0;  ///< px^2/s^2, px^2/s
+  /// A feature and what it was in the pair before.
+  struct Seen {
+    Eigen::Vector3d before;  ///< u_left, v_left, disparity, px
+    Eigen::Vector2d now;     ///< u_left, v_left, px
+  };
+  struct Pair {
+    StereoCamera camera;
+    std::vector<Seen> seen;
+    Eigen::Isometry3d T_current_previous;
+    double dt;             ///< since the pair before, s
+    Eigen::Vector3d rate;  ///< mean over that time, rad/s about the camera's axes
+  };
+  std::vector<Seen> seenBefore(const StereoFeatures& features, const OdometryResult& result) const;
+  void measure();
+
+  std::deque<Pair> pairs_;                    ///< the last ones; each continues the one before
+  std::vector<float> us_, vs_;                ///< features of the last pair, px
+  double information_ = 0.0, product_ = 0.0;  ///< of instrument and shift for 1 s, of instrument and residual
   /// Sums over pairs of squares and products of information and product, for the empirical deviation.
   double information_square_ = 0.0, mixed_ = 0.0, product_square_ = 0.0;
-  double pairs_ = 0.0;
-  Vector6d usual_velocity_ = Vector6d::Zero();
+  double measured_ = 0.0;  ///< pairs
 };
 
 }  // namespace sdvo

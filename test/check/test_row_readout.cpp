@@ -5,46 +5,76 @@
 
 namespace sdvo::test_row_readout {
 
-/// 60 pairs of a camera that shakes, seen with a readout, s, and 0.3 px of noise.
+constexpr double kInterval = 0.05;  // s
+
+/// Rate of a camera that turns slowly and shakes, rad/s.
+Eigen::Vector3d rateAt(double time) {
+  return {0.3 * std::sin(9.0 * time), std::cos(5.0 * time), 0.2 * std::sin(13.0 * time)};
+}
+
+Eigen::Isometry3d motionSince(double time) {
+  constexpr int kSteps = 20;
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  for (int k = 0; k < kSteps; ++k) {
+    Vector6d velocity;
+    velocity << 0.2, 0.0, 0.5, rateAt(time + (k + 0.5) / kSteps * kInterval);
+    T = T * expSE3(Vector6d(kInterval / kSteps * velocity));
+  }
+  return T;
+}
+
+/// 80 pairs, seen with a readout, s, and 0.3 px of noise. Half of the points of each are seen in the next one, too.
 RowReadout watched(double readout) {
+  constexpr int kPoints = 200;
   const StereoCamera camera = synthetic::camera();
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
   RowReadout result;
-  for (int pair = 0; pair < 60; ++pair) {
-    Vector6d velocity;
-    velocity << 0.2, 0.0, 0.5, 0.6 * std::sin(0.9 * pair), std::cos(0.7 * pair), 0.3 * std::sin(1.1 * pair);
+  std::vector<Eigen::Vector3d> old, now;  // points in the last camera's frame, in this one's
+  StereoFeatures before;
+  for (int pair = 0; pair < 80; ++pair) {
+    OdometryResult moved;
+    moved.has_motion = pair > 0;
+    moved.dt = kInterval;
+    moved.T_previous_current = motionSince((pair - 1) * kInterval);
+    moved.inliers = kPoints;
+    now.clear();
+    for (const Eigen::Vector3d& point : old) now.push_back(moved.T_previous_current.inverse() * point);
+    const std::size_t seen_again = now.size();
+    for (int i = 0; i < kPoints; ++i)
+      now.push_back(camera.backProject(camera.width * uniform(random), camera.height * uniform(random),
+                                       10.0 + 30.0 * uniform(random)));
     StereoFeatures features;
     features.camera = camera;
-    OdometryResult moved;
-    moved.has_motion = true;
-    moved.dt = 0.1;
-    moved.T_previous_current = expSE3(moved.dt * velocity);
-    moved.inliers = 200;
-    for (int i = 0; i < 200; ++i) {
-      const double u = camera.width * uniform(random), v = camera.height * uniform(random);
-      const double disparity = 10.0 + 30.0 * uniform(random);
-      const Eigen::Vector3d point = camera.backProject(u, v, disparity);
-      const double late = readout * (v - camera.cy) / camera.height;
-      const Eigen::Vector3d pixel = camera.project(expSE3(late * velocity).inverse() * point);
-      const Eigen::Vector3d before = camera.project(moved.T_previous_current * point);
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      const double late = readout * ((camera.project(now[i]).y() + 0.5) / camera.height - 0.5);
+      Vector6d turned = Vector6d::Zero();
+      turned.tail<3>() = late * rateAt(pair * kInterval);
+      const Eigen::Vector3d pixel = camera.project(expSE3(turned).inverse() * now[i]);
       features.u.push_back(static_cast<float>(pixel.x() + 0.3 * normal(random)));
       features.v.push_back(static_cast<float>(pixel.y() + 0.3 * normal(random)));
-      features.disparity.push_back(static_cast<float>(disparity));
-      moved.flow.push_back({static_cast<float>(before.x()), static_cast<float>(before.y()),
-                            static_cast<float>(before.x() - before.z()), i, true});
+      features.disparity.push_back(static_cast<float>(camera.disparity(now[i].z())));
+      if (i >= seen_again) continue;
+      const std::size_t k = before.u.size() - kPoints + i;
+      moved.flow.push_back({before.u[k] + 0.5f, before.v[k], before.disparity[k], static_cast<int>(i), true});
     }
     result.add(features, moved);
+    before = features;
+    old.assign(now.end() - kPoints, now.end());
   }
   return result;
 }
 
 TEST(RowReadout, FindsARollingShutter) {
-  const auto found = watched(0.01).estimate();
-  ASSERT_TRUE(found);
-  EXPECT_NEAR(found->value, 0.01, 0.001);
-  EXPECT_TRUE(found->isRolling());
+  for (const double readout : {0.01, 0.025, -0.017}) {
+    const auto found = watched(readout).estimate();
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->value, readout, 0.001);
+    EXPECT_LT(std::abs(found->value - readout), 3.0 * found->sigma);
+    EXPECT_LT(found->sigma, 0.003);
+    EXPECT_TRUE(found->isRolling());
+  }
 }
 
 TEST(RowReadout, AGlobalShutterIsNone) {
