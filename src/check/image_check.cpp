@@ -123,7 +123,8 @@ Finding checkCorners(double corners, int least, const std::string& more) {
 Finding RefusalCheck::judge(double few) const {
   return judged(refused_ > few * pairs_, refused_ > 0,
                 text(0, refused_, " of ", pairs_, " pairs refused") + (why_.empty() ? "" : ": " + why_),
-                "look at both images: sides, mounting, calibration");
+                "look at both images: exchange their topics where the sides are swapped (offline --images, and --infos where "
+                "camera_info is right), else mend mounting or calibration");
 }
 
 void ImageCheck::add(const cv::Mat& left, const cv::Mat& right, const ExtractionReport& report) {
