@@ -114,6 +114,8 @@ void OdometryState::takeSeed() {
 void OdometryState::recalibrate(const VisualOdometryOptions& options, const StereoFeatures& given) {
   forgetRig(options);
   covariance.beginMap();
+  forgetMaps();
+  newest.reset();
   map.emplace(options.map);
   map->insert(alignmentWith(options.noise), given, pairs, T_origin_camera.inverse(), {}, rig.calibration.calibration());
   camera = lens = given.camera;

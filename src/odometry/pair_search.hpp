@@ -40,7 +40,6 @@ class PairSearch {
   double dt() const { return dt_; }          ///< since the previous pair, s
   double frozen() const { return frozen_; }  ///< log-odds that its images repeat although the camera moved
 
-  const StereoFeatures& given() const { return given_; }
   /// All features in the map's camera.
   const StereoFeatures& whole() const { return refocused_ ? *refocused_ : given_; }
   /// Those that do not repeat the previous pair's, of a right camera that did not rotate.

@@ -217,7 +217,12 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   finish(pair, step);
   rememberRolled(pair, step);
   step.time = stopwatch.lap();
-  return sound(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
+  const OdometryResult result = sound(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
+  // A driver's fault is short: a calibration that lasts is new.
+  if (result.has_pose && pair.refutesCamera() &&
+      1e-9 * static_cast<double>(given.stamp - *state_.lens_stamp) > options_.tracking.max_gap)
+    state_.recalibrate(options_, given);
+  return result;
 }
 
 /// The only way out of update(): no result leaves with a number that is not finite or a covariance that is none.
@@ -554,10 +559,6 @@ void VisualOdometry::Impl::finish(const PairSearch& pair, Step& step) {
   if (!step.hasPose()) return;
   state_.last_pose_stamp = features.stamp;
   state_.outage.havePose();
-  // A driver's fault is short.
-  if (pair.refutesCamera() &&
-      static_cast<double>(features.stamp - *state_.lens_stamp) * 1e-9 > options_.tracking.max_gap)
-    state_.recalibrate(options_, pair.given());
 }
 
 std::optional<Floor> VisualOdometry::Impl::floor() const {
