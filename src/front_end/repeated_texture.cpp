@@ -31,8 +31,8 @@ bool isRepeated(const std::vector<std::size_t>& with_rival, const PeriodOf& peri
 void confirmByUnique(const std::vector<cv::Point2f>& left_positions, const std::vector<std::size_t>& with_rival,
                      std::vector<StereoMatch>& matches) {
   constexpr std::size_t kFewest = 5, kNearest = 8;  // unique matches (chosen)
-  constexpr double kAgreeing = 0.75;                // ratio of the nearest (chosen)
-  constexpr float kTolerance = 0.125f;  // periods: a quarter of other surfaces agree by chance
+  constexpr double kLikeNeighbours = 0.75;          // ratio of the nearest (chosen)
+  constexpr float kTolerance = 0.125f;              // periods: a quarter of other surfaces agree by chance
   std::vector<StereoMatch> unique;
   for (std::size_t i = 0; i < matches.size(); ++i)
     if (matches[i].period == 0.f && !std::binary_search(with_rival.begin(), with_rival.end(), i))
@@ -51,7 +51,7 @@ void confirmByUnique(const std::vector<cv::Point2f>& left_positions, const std::
         unique.begin(), unique.begin() + static_cast<std::ptrdiff_t>(count), [&](const StereoMatch& other) {
           return std::abs(other.disparity - match.disparity) < kTolerance * match.period;
         });
-    if (static_cast<double>(agreeing) >= kAgreeing * static_cast<double>(count)) match.period = 0.f;
+    if (static_cast<double>(agreeing) >= kLikeNeighbours * static_cast<double>(count)) match.period = 0.f;
   }
 }
 

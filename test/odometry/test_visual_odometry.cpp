@@ -1261,13 +1261,13 @@ TEST(VisualOdometry, ARollingShutterOfKnownReadoutIsAsGoodAsAGlobalOne) {
     VisualOdometryOptions options;
     options.calibration.readout = known;
     VisualOdometry odometry(options);
-    std::vector<Eigen::Vector3d> positions;
+    std::vector<Eigen::Vector3d> path;
     for (int i = 0; i < 40; ++i) {
       const OdometryResult result = odometry.update(rolledPair(i, taken));
       EXPECT_TRUE(result.has_pose) << i << ": " << result.reason;
-      positions.push_back(result.T_origin_camera.translation());
+      path.push_back(result.T_origin_camera.translation());
     }
-    return positions;
+    return path;
   };
   const auto largest = [truth = positions(0.0, 0.0)](const std::vector<Eigen::Vector3d>& estimate) {
     double error = 0.0;
