@@ -17,7 +17,7 @@ void withEveryKernel(const Use& use) {
   allowVectorKernels(true);
 }
 
-/// What every kernel computes, which is expected to be the same to the bit.
+/// The result of a computation, which every kernel is expected to give to the bit.
 template <class Compute>
 auto ofEveryKernel(const Compute& compute) {
   allowVectorKernels(false);

@@ -17,7 +17,7 @@ std::string placeWords(const StereoFeatures& features, const std::vector<int>& m
   return words.str();
 }
 
-/// The motion in view that competes with the one that is found.
+/// Names the two motions in view, if a second one competes; else empty.
 std::string rivalWords(const MotionScene& scene, const MotionHypothesis& found) {
   if (!found.rival) return "";
   std::ostringstream words;

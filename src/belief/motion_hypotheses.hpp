@@ -41,7 +41,8 @@ struct PlaceBelief {
   MotionMixture mixture;
 };
 
-/// The alternatives are a place that looks alike and, if both match by chance, the camera's motion by the `prior`.
+/// Chooses between the place and the one that looks alike, by the `prior` of the motion. The other place stays an
+/// alternative; so does the prior's motion, in case that the map matches by chance.
 PlaceBelief weigh(const FoundPlace& place, const std::vector<ExpectedMotion>& prior);
 
 /// The input of a search for a pair's motion. The references must outlive it.

@@ -10,12 +10,12 @@
 
 namespace sdvo {
 
-/// Posterior of the motion that is taken: it is the camera's, or one of the alternatives is. Rivals in view, places
-/// that look alike and causes of doubt are such alternatives.
+/// Posterior of the camera's motion: either the one that the odometry reports is right, or one of the alternatives.
+/// These are rival motions in view, places that look alike, and faults that would mislead it.
 class MotionMixture {
  public:
   struct Alternative {
-    double log_odds;    ///< against the motion that is taken
+    double log_odds;    ///< against the motion that is reported
     Matrix6d moment;    ///< second moment of that motion's error if this is right, m and rad
     std::string cause;  ///< in words
   };

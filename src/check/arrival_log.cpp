@@ -12,8 +12,8 @@ namespace sdvo {
 namespace {
 
 constexpr double kFastest = 200.0;   // arrivals a second on each topic (chosen): more are no camera's
-constexpr double kLately = 5.0;      // s, of losses and rates
-constexpr double kPatience = 1.0;    // s beyond the longest wait of a pair so far
+constexpr double kLately = 5.0;      // s (chosen), of losses and rates
+constexpr double kPatience = 1.0;    // s (chosen) beyond the longest wait of a pair so far
 constexpr double kLate = 0.1;        // s between messages of one stamp (chosen): a queue is too short, perhaps
 constexpr double kHalf = 0.45;       // ratio of a period: images of one pair are nearer; below 0.5, for jitter
 constexpr double kOtherClock = 1.0;  // s between stamps and arrivals (chosen): no camera takes as long
@@ -253,7 +253,8 @@ ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) con
       if (there.stamp == 0) continue;
       const double here_to_there = std::abs(secondsBetween(here.stamp, there.stamp));
       gap = std::min(gap, here_to_there);
-      if (here_to_there <= options_.pairing.allowedGap()) gaps.delay = std::max(gaps.delay, std::abs(there.now - here.now));
+      if (here_to_there <= options_.pairing.allowedGap())
+        gaps.delay = std::max(gaps.delay, std::abs(there.now - here.now));
     }
     ++gaps.all;
     gaps.missing += gap >= half;
@@ -273,10 +274,9 @@ std::string ArrivalLog::advise(double begin) const {
     return text(1, "; the nearest stamps of left and right are ", 1e3 * right.least, " to ", 1e3 * right.most,
                 " ms apart, more than ", options_.pairing.approximate_sync ? "max_interval (" : "sync_tolerance (",
                 1e3 * options_.pairing.allowedGap(), " ms)") +
-           (options_.pairing.approximate_sync
-                ? ""
-                : text(3, ": set sync_tolerance to ", right.most + 0.001,
-                       " if one trigger takes both, else approximate_sync to true"));
+           (options_.pairing.approximate_sync ? ""
+                                              : text(3, ": set sync_tolerance to ", right.most + 0.001,
+                                                     " if one trigger takes both, else approximate_sync to true"));
   for (const auto& [gaps, sides] :
        {std::pair(right, " left images have no right one"), std::pair(left, " right images have no left one")})
     if (2 * gaps.missing > gaps.all)

@@ -9,8 +9,8 @@
 namespace sdvo {
 namespace {
 
-constexpr double kWindow = 5.0;     // s, of the rate
-constexpr std::size_t kFewest = 3;  // arrivals that make one
+constexpr double kWindow = 5.0;     // s (chosen), of the rate
+constexpr std::size_t kFewest = 3;  // arrivals (chosen) that make one
 
 }  // namespace
 

@@ -91,7 +91,7 @@ void RowReadout::measure() {
   if (static_cast<int>(shifts.size()) < kFewestMeasured) return;
 
   // Cauchy's kernel around the pair's own fit, which has the readout: else the largest shifts would weigh least.
-  constexpr int kReweightings = 4;
+  constexpr int kReweightings = 4;  // (chosen)
   const double corner = NoiseOptions().corner, bend = noiseGate(2) * corner * corner;
   using Vector = Eigen::Matrix<double, 7, 1>;
   using Matrix = Eigen::Matrix<double, 7, 7>;
@@ -126,7 +126,7 @@ void RowReadout::measure() {
 
 std::optional<RowReadout::Estimate> RowReadout::estimate() const {
   // Rates that the readout itself biases: drives that follow hand_held 921 and 922 err by 0 to 6 % at 10 and 25 ms.
-  constexpr double kModel = 0.05;
+  constexpr double kModel = 0.05;  // ratio of the value
   if (measured_ < kFewestMeasured || !(information_ > 0.0)) return std::nullopt;
   const double value = product_ / information_;
   const double spread = product_square_ - 2.0 * value * mixed_ + value * value * information_square_;

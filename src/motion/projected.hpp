@@ -8,7 +8,7 @@
 
 namespace sdvo {
 
-/// What the kernels need of a pose and a camera.
+/// Pose and camera as plain numbers, for the kernels.
 struct Projection {
   double rotation[3][3], translation[3];
   double fx, fy, cx, cy, fx_baseline, nearest;

@@ -13,7 +13,7 @@
 
 namespace sdvo {
 
-/// What a pair's search uses besides the state.
+/// Searches of a motion near a prediction, and of a place after an outage, with the odometry's options.
 struct SearchTools {
   explicit SearchTools(const VisualOdometryOptions& options);
 
@@ -42,9 +42,9 @@ class PairSearch {
 
   /// All features in the map's camera.
   const StereoFeatures& whole() const { return refocused_ ? *refocused_ : given_; }
-  /// Those that do not repeat the previous pair's, of a right camera that did not rotate.
+  /// Features without those that repeat the previous pair's; the right camera's learnt rotation is undone.
   const StereoFeatures& taken() const { return rotated_back_ ? *rotated_back_ : part(); }
-  /// Those that the motion is found with.
+  /// The same at the left image's moment, in all rows: the motion is found with these.
   const StereoFeatures& features() const { return global_ ? *global_ : inStep(); }
   /// For each of features() its index in the pair as given.
   const std::vector<int>& givenIndices() const { return new_features_; }

@@ -89,7 +89,7 @@ class VisualOdometry::Impl {
     double distance = 0.0;                ///< from that key frame, m
   };
 
-  /// What becomes of a pair with a motion: why it cannot join the map, or the map with it.
+  /// Decision about a pair: the reason why it cannot join the map, else the map with it.
   struct Outcome {
     std::string refusal;
     std::optional<Candidate> candidate;

@@ -22,8 +22,9 @@ class VisualOdometry {
 
   /// Processes the next pair. Stamps must increase, features and guess must pass check(), else std::invalid_argument
   /// and the state is as before. `guess` is one more hypothesis of the motion, never a measurement. A pair's camera
-  /// that isLike() the first one's continues the map; another camera starts a new epoch. A change that the images
-  /// refute is not believed for tracking/max_gap, and then begins a map.
+  /// that isLike() the first one's continues the map; another camera starts a new epoch. A changed camera that
+  /// the images refute is ignored for tracking/max_gap seconds; if it lasts, a new map begins with it in the same
+  /// epoch.
   OdometryResult update(const StereoFeatures& features, const std::optional<MotionGuess>& guess = std::nullopt);
 
   /// Back to the initial pose and a new epoch; nothing is remembered.
