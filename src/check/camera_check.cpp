@@ -29,7 +29,7 @@ void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features, 
   focus_.add(pair.left, pair.right);
   images_.add(pair.left, pair.right, features.report);
   emitter_.add(pair.left);
-  odometry_.add(features, result);
+  odometry_.add(result);
   if (result.state == TrackingState::kTracking && result.has_motion) motions_.push_back(result.T_previous_current);
   cv::hconcat(pair.left, pair.right, picture_);
 }

@@ -8,12 +8,12 @@
 
 namespace sdvo {
 
-void OdometryCheck::add(const StereoFeatures& features, const OdometryResult& result) {
+void OdometryCheck::add(const OdometryResult& result) {
   if (result.state == TrackingState::kWaiting) return;
   (result.state == TrackingState::kTracking ? tracking_ : result.state == TrackingState::kLost ? lost_ : degraded_)++;
   if (result.state != TrackingState::kTracking) ++reasons_[result.reason];
   distance_ = result.distance;
-  readout_.add(features, result);
+  if (std::isfinite(result.readout)) readout_ = {result.readout, result.readout_sigma};
   if (!result.has_motion) return;
   inliers_.push_back(result.inliers);
   rotations_.push_back(Eigen::AngleAxisd(result.T_previous_current.rotation()).angle() * 180.0 / EIGEN_PI);
@@ -35,14 +35,17 @@ Finding OdometryCheck::judge() const {
 }
 
 Finding OdometryCheck::shutter() const {
-  if (compensated_ != 0.0) return {Verdict::kOk, text(1, "a readout of ", 1e3 * compensated_, " ms is compensated")};
-  const auto readout = readout_.estimate();
-  if (!readout) return {Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
-  return judged(
-      false, readout->isRolling(),
-      text(1, "last row ", 1e3 * std::abs(readout->value), " +- ", 1e3 * readout->sigma, " ms ",
-           readout->value > 0.0 ? "after" : "before", " the first"),
-      text(4, "a rolling shutter: set calibration/readout to ", readout->value, ", or take cameras with a global one"));
+  if (!readout_) return {Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
+  const auto [value, sigma] = *readout_;
+  const std::string what = text(1, "last row ", 1e3 * std::abs(value), " +- ", 1e3 * sigma, " ms ",
+                                value > 0.0 ? "after" : "before", " the first");
+  if (told_ != 0.0)
+    return judged(false, RowReadout::Estimate{value - told_, sigma}.isRolling(),
+                  what + text(1, ", compensated as ", 1e3 * told_, " ms"),
+                  text(4, "set calibration/readout to ", value));
+  return judged(false, readout_->isRolling(), what,
+                text(4, "a rolling shutter, compensated once it was known: set calibration/readout to ", value,
+                     ", then it is from the start"));
 }
 
 }  // namespace sdvo

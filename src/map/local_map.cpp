@@ -70,6 +70,7 @@ LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_new
   View view;
   view.points.kind = kind_;
   view.ids.reserve(points_.size()), view.seen.reserve(points_.size()), view.pixels.reserve(points_.size());
+  view.newest.reserve(points_.size());
   const int since = lookedForSince();
   for (std::size_t p = 0; p < points_.size(); ++p) {
     if (!isLookedFor(points_[p], since)) continue;
@@ -79,6 +80,8 @@ LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_new
     if (!camera_.sees(*predicted) && !isSeenNext(*predicted)) continue;
     view.ids.push_back(static_cast<int>(p));
     view.seen.push_back(points_[p].seen);
+    const FrameObservation& last = points_[p].observations.back();
+    view.newest.push_back(last.frame_id == newestId() ? last.feature : -1);
     view.pixels.emplace_back(static_cast<float>(predicted->x()), static_cast<float>(predicted->y()),
                              static_cast<float>(predicted->z()));
   }

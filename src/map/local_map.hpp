@@ -55,8 +55,9 @@ class LocalMap {
     /// (u_left, v_left, disparity without the rig's error) in the newest pair, px. A point that the next motion brings
     /// into view is outside of its image.
     std::vector<cv::Point3f> pixels;
-    std::vector<int> ids;   ///< Sighting::point
-    std::vector<int> seen;  ///< number of confirmed pairs that saw the point, also of those that left the map
+    std::vector<int> ids;     ///< Sighting::point
+    std::vector<int> seen;    ///< number of confirmed pairs that saw the point, also of those that left the map
+    std::vector<int> newest;  ///< feature of the newest pair that saw the point; -1 for none
   };
   /// Points in the image of the newest pair, and those that the motion `T_next_newest` brings into the next one.
   View view(const std::optional<Eigen::Isometry3d>& T_next_newest = std::nullopt) const;

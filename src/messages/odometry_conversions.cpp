@@ -127,6 +127,8 @@ stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result,
   info.disparity_bend_sigma = static_cast<float>(result.disparity_bend_sigma);
   info.right_delay = static_cast<float>(result.right_delay);
   info.right_delay_sigma = static_cast<float>(result.right_delay_sigma);
+  info.readout = static_cast<float>(result.readout);
+  info.readout_sigma = static_cast<float>(result.readout_sigma);
   for (int axis = 0; axis < 3; ++axis) {
     info.right_rotation[axis] = static_cast<float>(result.right_rotation[axis]);
     info.right_rotation_sigma[axis] = static_cast<float>(result.right_rotation_sigma[axis]);

@@ -40,6 +40,8 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
     }
     result.right_delay = known.delay(), result.right_delay_sigma = sigma[RigEstimate::kDelay];
   }
+  if (const auto readout = rig.readout.estimate())
+    result.readout = readout->value, result.readout_sigma = readout->sigma;
   if (const auto rotation = rig.row_pattern.rotation()) {
     Eigen::Vector3d value = rotation->value, variance = rotation->covariance.diagonal();
     const double of_roll = known.covariance(RigEstimate::kRoll, RigEstimate::kRoll);

@@ -141,8 +141,8 @@ std::optional<StereoFeatures> PairSearch::synchronised(const Vector6d& velocity)
 /// Moves all rows to the stamp, by the velocity of the camera there.
 void PairSearch::roll(const Vector6d& velocity) {
   if (!state_.shutter.isRolling()) return;
-  rolled_ = RolledPair{inStep(), velocity};
-  global_ = state_.shutter.asGlobal(*rolled_);
+  rolled_ = RolledPair{inStep(), state_.shutter.readout(), velocity};
+  global_ = RollingShutter::asGlobal(*rolled_);
 }
 
 /// Moves rows of the pair, and of the map's newest one, by the velocities that the pair's motion implies. False if they

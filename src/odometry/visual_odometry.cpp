@@ -216,6 +216,8 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
                    step.state == TrackingState::kTracking && pair.scene());
   finish(pair, step);
   rememberRolled(pair, step);
+  if (options_.calibration.enabled && options_.calibration.readout == 0.0)
+    state_.shutter.setReadout(state_.rig.readout.proved());
   step.time = stopwatch.lap();
   const OdometryResult result = sound(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
   // A driver's fault is short: a calibration that lasts is new.

@@ -109,6 +109,10 @@ void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measur
     right_delay.learn(measured->features, measured->dt, measured->velocity(), calibration.delay(), is_confirmed);
   else
     right_delay.interrupt();
+  if (measured && is_confirmed)
+    readout.add(measured->features, found, measured->since_reference);
+  else
+    readout.interrupt();
   if (const auto delay = right_delay.estimate()) calibration.noteRows(RigEstimate::kDelay, delay->value, delay->sigma);
   if (const auto by_rows = row_pattern.rotation())
     calibration.noteRows(RigEstimate::kRoll, by_rows->value.z(), std::sqrt(withRectification(*by_rows)(2, 2)));

@@ -12,6 +12,7 @@
 #include "right_camera_delay.hpp"
 #include "right_rotation.hpp"
 #include "row_pattern.hpp"
+#include "row_readout.hpp"
 
 namespace sdvo {
 
@@ -44,6 +45,7 @@ struct LearntRig {
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Zero();
   RightCameraDelay right_delay;
+  RowReadout readout;
   Noise noise;
 
   LearntRig(const CalibrationOptions& options, const NoiseOptions& noise);
@@ -59,7 +61,7 @@ struct LearntRig {
   RigEstimate::Matrix rotate(const ShownRotation& shown, const StereoCamera& camera);
 
   /// Learns from a pair. Refused pairs raise the odds of right images of other moments, unconfirmed ones interrupt the
-  /// delay's pairs. `measured` is null without a motion.
+  /// pairs of delay and readout. `measured` is null without a motion.
   void learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
              const ShownRotation& shown, bool is_confirmed);
 

@@ -20,11 +20,11 @@ Eigen::Matrix3d gainOfRows(const RateByRows& rate, double variance) {
 
 }  // namespace
 
-StereoFeatures RollingShutter::asGlobal(const RolledPair& pair) const {
+StereoFeatures RollingShutter::asGlobal(const RolledPair& pair) {
   const StereoCamera& camera = pair.features.camera;
   StereoFeatures result = pair.features;
   for (int i = 0; i < result.count(); ++i) {
-    const Eigen::Isometry3d T_stamp_row = expSE3(timeOf(camera, pair.features.v[i]) * pair.velocity);
+    const Eigen::Isometry3d T_stamp_row = expSE3(pair.readout * rowTime(camera, pair.features.v[i]) * pair.velocity);
     const Eigen::Vector3d point = T_stamp_row * pair.features.point(i);
     if (!(point.z() > camera.nearestDepth())) continue;
     const Eigen::Vector3d pixel = camera.project(point);
@@ -61,7 +61,7 @@ std::optional<RateByRows> RollingShutter::rateByRows(const RolledPair& pair, con
       if (!(here.z() > camera.nearestDepth())) continue;
       const Eigen::Matrix<double, 2, 6> by_pose = motionJacobian(camera, T, point).topRows<2>();
       Eigen::Matrix<double, 2, 9> jacobian;
-      jacobian << by_pose, -timeOf(camera, pair.features.v[match.current]) * by_pose.rightCols<3>();
+      jacobian << by_pose, -pair.readout * rowTime(camera, pair.features.v[match.current]) * by_pose.rightCols<3>();
       const Eigen::Vector2d residual = (sighting.measurement - camera.project(here)).head<2>();
       const double square = (residual - jacobian * error).squaredNorm();
       const double weight = 1.0 / (sighting.sigma * sighting.sigma + square);  // Cauchy's kernel

@@ -9,6 +9,11 @@
 
 namespace sdvo {
 
+/// Time at which row `v` (px) is taken after the stamp, in readouts: the middle one is taken at the stamp.
+inline double rowTime(const StereoCamera& camera, double v) {
+  return (v + 0.5) / camera.height - 0.5;
+}
+
 /// Rate of the camera's rotation at the stamp, rad/s about its axes, by the rows of one pair against the map.
 struct RateByRows {
   Eigen::Vector3d value;
@@ -20,6 +25,7 @@ struct RateByRows {
 /// A pair as a rolling shutter took it, with the camera's velocities in its own frame, m/s and rad/s.
 struct RolledPair {
   StereoFeatures features;
+  double readout = 0.0;                   ///< s, see RollingShutter
   Vector6d velocity = Vector6d::Zero();   ///< at the stamp, by which rows are moved there
   std::optional<Vector6d> mean{};         ///< over the interval before the pair; none if it is unknown
   std::optional<Vector6d> mean_before{};  ///< over the interval before that one
@@ -44,13 +50,12 @@ class RollingShutter {
   RollingShutter(double readout, double rotation_acceleration)
       : readout_(readout), acceleration_square_(rotation_acceleration * rotation_acceleration) {}
 
+  double readout() const { return readout_; }
+  void setReadout(double readout) { readout_ = readout; }
   bool isRolling() const { return readout_ != 0.0; }
 
-  /// Time of row `v` (px) after the stamp, s.
-  double timeOf(const StereoCamera& camera, double v) const { return readout_ * ((v + 0.5) / camera.height - 0.5); }
-
   /// The features as a global shutter would have seen them at the stamp.
-  StereoFeatures asGlobal(const RolledPair& pair) const;
+  static StereoFeatures asGlobal(const RolledPair& pair);
 
   /// Whether a difference between two velocities moves no row by more than a part of its noise.
   bool isNegligible(const StereoCamera& camera, const Vector6d& difference) const;

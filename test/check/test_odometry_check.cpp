@@ -14,7 +14,7 @@ Finding judged(int lost, int degraded) {
                    : i < lost + degraded ? TrackingState::kDegraded
                                          : TrackingState::kTracking;
     result.reason = i < lost ? "too few matches" : "doubtful";
-    check.add({}, result);
+    check.add(result);
   }
   return check.judge();
 }
@@ -28,9 +28,23 @@ TEST(OdometryCheck, NamesTheStatesAndTheReasonThatIsMostFrequent) {
   EXPECT_EQ(OdometryCheck().judge().verdict, Verdict::kOpen);
 }
 
-TEST(OdometryCheck, ACompensatedReadoutIsNoFault) {
+/// The odometry was `told` one readout and measures another one, s.
+Finding shutter(double told, double measured) {
+  OdometryCheck check(told);
+  OdometryResult result;
+  result.readout = measured, result.readout_sigma = 0.0005;
+  check.add(result);
+  return check.shutter();
+}
+
+TEST(OdometryCheck, AReadoutIsAFaultUnlessTheOdometryIsToldOfIt) {
   EXPECT_EQ(OdometryCheck().shutter().verdict, Verdict::kOpen);
-  EXPECT_EQ(OdometryCheck(0.0256).shutter().text(), "a readout of 25.6 ms is compensated");
+  EXPECT_EQ(shutter(0.0, 0.001).verdict, Verdict::kOk);
+  EXPECT_EQ(shutter(0.025, 0.0256).verdict, Verdict::kOk);
+  for (const double told : {0.0, 0.01, -0.0256}) {
+    EXPECT_EQ(shutter(told, 0.0256).verdict, Verdict::kWarn) << told;
+    EXPECT_TRUE(contains(shutter(told, 0.0256).text(), "calibration/readout to 0.0256")) << told;
+  }
 }
 
 }  // namespace sdvo::test_odometry_check

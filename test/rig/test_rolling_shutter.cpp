@@ -44,18 +44,15 @@ StereoFeatures rolled(const Vector6d& velocity, double readout) {
 
 TEST(RollingShutter, TakesTheMiddleRowAtTheStamp) {
   const StereoCamera camera = synthetic::camera();
-  const RollingShutter down(kReadout, kAcceleration), up(-kReadout, kAcceleration);
-  EXPECT_DOUBLE_EQ(down.timeOf(camera, 0.5 * camera.height - 0.5), 0.0);
-  EXPECT_DOUBLE_EQ(down.timeOf(camera, -0.5), -0.5 * kReadout);
-  EXPECT_DOUBLE_EQ(down.timeOf(camera, camera.height - 0.5), 0.5 * kReadout);
-  EXPECT_DOUBLE_EQ(up.timeOf(camera, -0.5), 0.5 * kReadout);
+  EXPECT_DOUBLE_EQ(rowTime(camera, 0.5 * camera.height - 0.5), 0.0);
+  EXPECT_DOUBLE_EQ(rowTime(camera, -0.5), -0.5);
+  EXPECT_DOUBLE_EQ(rowTime(camera, camera.height - 0.5), 0.5);
   EXPECT_FALSE(RollingShutter(0.0, kAcceleration).isRolling());
 }
 
 TEST(RollingShutter, MovesPointsToWhereAGlobalOneSeesThem) {
   for (const double readout : {kReadout, -kReadout}) {
-    const StereoFeatures global =
-        RollingShutter(readout, kAcceleration).asGlobal({rolled(turning(), readout), turning()});
+    const StereoFeatures global = RollingShutter::asGlobal({rolled(turning(), readout), readout, turning()});
     const std::vector<Eigen::Vector3d> points = pointsOf(global.camera);
     for (int i = 0; i < global.count(); ++i)
       EXPECT_LT((global.measurement(i) - global.camera.project(points[static_cast<std::size_t>(i)])).norm(), 1e-3);
@@ -80,7 +77,7 @@ TEST(RollingShutter, RowsShowTheRateAtTheStamp) {
   const RollingShutter shutter(kReadout, kAcceleration);
   Vector6d assumed = turning();
   assumed.tail<3>() += Eigen::Vector3d(0.05, -0.08, 0.04);
-  const RolledPair pair{rolled(turning(), kReadout), assumed};
+  const RolledPair pair{rolled(turning(), kReadout), kReadout, assumed};
   const auto rate = shutter.rateByRows(pair, foundIn(shutter.asGlobal(pair)));
   ASSERT_TRUE(rate);
   EXPECT_LT((rate->value - turning().tail<3>()).norm(), 0.002);
@@ -89,7 +86,7 @@ TEST(RollingShutter, RowsShowTheRateAtTheStamp) {
 
 TEST(RollingShutter, FewPointsShowNoRate) {
   const RollingShutter shutter(kReadout, kAcceleration);
-  const RolledPair pair{rolled(turning(), kReadout), turning()};
+  const RolledPair pair{rolled(turning(), kReadout), kReadout, turning()};
   MotionHypothesis found = foundIn(shutter.asGlobal(pair));
   found.sightings.clear(), found.motion.inliers.clear();
   EXPECT_FALSE(shutter.rateByRows(pair, found));

@@ -26,6 +26,8 @@ TEST(ToInfo, TellsResultAndImageSide) {
   result.disparity_bend = 1.5;
   result.right_delay = -0.0031;
   result.right_delay_sigma = 0.0001;
+  result.readout = 0.025;
+  result.readout_sigma = 0.0004;
   result.right_rotation << 0.001, -0.002, 0.003;
   FeaturesMessage features = someMessage();
   features.dropped_pairs = 6;
@@ -57,6 +59,8 @@ TEST(ToInfo, TellsResultAndImageSide) {
   EXPECT_FLOAT_EQ(info.disparity_bend, 1.5f);
   EXPECT_FLOAT_EQ(info.right_delay, -0.0031f);
   EXPECT_FLOAT_EQ(info.right_delay_sigma, 0.0001f);
+  EXPECT_FLOAT_EQ(info.readout, 0.025f);
+  EXPECT_FLOAT_EQ(info.readout_sigma, 0.0004f);
   EXPECT_FLOAT_EQ(info.right_rotation[1], -0.002f);
 
   result.matches = result.inliers = 0;

@@ -151,6 +151,8 @@ void OdometryDiagnostics::addValues(Values& values) const {
                                    " +- ", last_->disparity_bend_sigma, " px at 45 degrees"));
   if (std::isfinite(last_->right_delay))
     values.add("right camera delay [ms]", text(2, 1e3 * last_->right_delay, " +- ", 1e3 * last_->right_delay_sigma));
+  if (std::isfinite(last_->readout))
+    values.add("readout [ms]", text(2, 1e3 * last_->readout, " +- ", 1e3 * last_->readout_sigma));
   if (std::isfinite(last_->right_rotation[0]))
     values.add("right camera rotation [mrad]", text(2, 1e3 * last_->right_rotation[0], " ", 1e3 * last_->right_rotation[1],
                                                     " ", 1e3 * last_->right_rotation[2]));

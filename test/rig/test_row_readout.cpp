@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "../../src/check/row_readout.hpp"
+#include <memory>
+
+#include "../../src/rig/row_readout.hpp"
 #include "../synthetic_scene.hpp"
 
 namespace sdvo::test_row_readout {
@@ -34,13 +36,11 @@ RowReadout watched(double readout) {
   std::vector<Eigen::Vector3d> old, now;  // points in the last camera's frame, in this one's
   StereoFeatures before;
   for (int pair = 0; pair < 80; ++pair) {
-    OdometryResult moved;
-    moved.has_motion = pair > 0;
-    moved.dt = kInterval;
-    moved.T_previous_current = motionSince((pair - 1) * kInterval);
-    moved.inliers = kPoints;
+    MotionHypothesis found;
+    found.motion.T_current_reference = motionSince((pair - 1) * kInterval).inverse();
+    auto view = std::make_shared<LocalMap::View>();
     now.clear();
-    for (const Eigen::Vector3d& point : old) now.push_back(moved.T_previous_current.inverse() * point);
+    for (const Eigen::Vector3d& point : old) now.push_back(found.motion.T_current_reference * point);
     const std::size_t seen_again = now.size();
     for (int i = 0; i < kPoints; ++i)
       now.push_back(camera.backProject(camera.width * uniform(random), camera.height * uniform(random),
@@ -56,10 +56,13 @@ RowReadout watched(double readout) {
       features.v.push_back(static_cast<float>(pixel.y() + 0.3 * normal(random)));
       features.disparity.push_back(static_cast<float>(camera.disparity(now[i].z())));
       if (i >= seen_again) continue;
-      const std::size_t k = before.u.size() - kPoints + i;
-      moved.flow.push_back({before.u[k] + 0.5f, before.v[k], before.disparity[k], static_cast<int>(i), true});
+      const int k = before.count() - kPoints + static_cast<int>(i);
+      view->pixels.emplace_back(before.u[k], before.v[k], before.disparity[k]);
+      view->newest.push_back(k);
+      found.matches.push_back({static_cast<int>(i), static_cast<int>(i), 0.f});
     }
-    result.add(features, moved);
+    found.view = view;
+    result.add(features, found, kInterval);
     before = features;
     old.assign(now.end() - kPoints, now.end());
   }

@@ -3,12 +3,13 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <deque>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
-#include "../rig/row_delay.hpp"
+#include "../belief/motion_hypotheses.hpp"
+#include "row_delay.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 
 namespace sdvo {
 
@@ -28,10 +29,14 @@ class RowReadout {
     bool isRolling() const { return std::abs(value) > kWarn && value * value > RowDelay::kSquare * sigma * sigma; }
   };
 
-  /// Adds a pair. All pairs of a drive must be given in turn.
-  void add(const StereoFeatures& features, const OdometryResult& result);
+  /// Adds a pair with rows as they were taken, and its motion of `dt` s since the pair before, the map's newest one.
+  void add(const StereoFeatures& features, const MotionHypothesis& found, double dt);
+  /// The next pair does not continue the last one.
+  void interrupt() { pairs_.clear(), last_.clear(); }
 
   std::optional<Estimate> estimate() const;
+  /// The estimate, s, of a shutter that is certainly rolling, once it is precise enough to be of use; else 0.
+  double proved() const;
 
  private:
   /// A feature and what it was in the pair before.
@@ -46,15 +51,14 @@ class RowReadout {
     double dt;             ///< since the pair before, s
     Eigen::Vector3d rate;  ///< mean over that time, rad/s about the camera's axes
   };
-  std::vector<Seen> seenBefore(const StereoFeatures& features, const OdometryResult& result) const;
+  std::vector<Seen> seenBefore(const StereoFeatures& features, const MotionHypothesis& found) const;
   void measure();
 
   std::deque<Pair> pairs_;                    ///< the last ones; each continues the one before
-  std::vector<float> us_, vs_;                ///< features of the last pair, px
+  std::vector<cv::Point2f> last_;             ///< features of the last pair, px
   double information_ = 0.0, product_ = 0.0;  ///< of instrument and shift for 1 s, of instrument and residual
   /// Sums over pairs of squares and products of information and product, for the empirical deviation.
   double information_square_ = 0.0, mixed_ = 0.0, product_square_ = 0.0;
-  double measured_ = 0.0;  ///< pairs
 };
 
 }  // namespace sdvo

@@ -1,0 +1,143 @@
+#include "row_readout.hpp"
+
+#include <Eigen/Cholesky>
+#include <array>
+#include <cmath>
+
+#include "../motion/noise.hpp"
+#include "../motion/pose_problem.hpp"
+#include "rolling_shutter.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr std::size_t kAround = 4;  // pairs before and after one, whose mean rates give the slow rate there
+
+/// A feature's position (u_left, v_left) against the map, px: its derivative by the pose, by a readout of 1 s at the
+/// rates as they are, and at slow ones.
+struct Shift {
+  Eigen::Matrix<double, 8, 2> derivative;
+  Eigen::Vector2d residual;
+};
+
+/// Ratio to a variance that so many pairs imply, by which RowDelay::kSquare is exceeded as rarely as with a known one:
+/// Student's distribution (Wallace 1959).
+double studentRatio(double pairs) {
+  const double freedom = pairs - 1.0, correction = (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
+  return pairs * std::expm1(RowDelay::kSquare / freedom * correction * correction) / RowDelay::kSquare;
+}
+
+}  // namespace
+
+/// Matched features, with the same points' positions in the previous pair. More of them would not show the readout
+/// better: the rates err more than positions.
+std::vector<RowReadout::Seen> RowReadout::seenBefore(const StereoFeatures& features,
+                                                     const MotionHypothesis& found) const {
+  constexpr std::size_t kMost = 256;  // (chosen)
+  std::vector<Seen> seen;
+  if (last_.empty()) return seen;
+  const std::size_t step = 1 + found.matches.size() / kMost;
+  for (std::size_t i = 0; i < found.matches.size(); i += step) {
+    const FeatureMatch& match = found.matches[i];
+    const int before = found.view->newest[match.reference];
+    if (before < 0) continue;
+    const cv::Point2f& last = last_[before];
+    seen.push_back({{last.x, last.y, found.view->pixels[match.reference].z},
+                    {features.u[match.current], features.v[match.current]}});
+  }
+  return seen;
+}
+
+void RowReadout::add(const StereoFeatures& features, const MotionHypothesis& found, double dt) {
+  constexpr double kSteady = 0.3;  // ratio (chosen) by which intervals may differ
+  if (!pairs_.empty() && !(std::abs(dt - pairs_.back().dt) < kSteady * pairs_.back().dt)) pairs_.clear();
+  const Eigen::Isometry3d& T = found.motion.T_current_reference;
+  pairs_.push_back({features.camera, seenBefore(features, found), T, dt, logSO3(T.linear().transpose()) / dt});
+  last_.clear();
+  for (int i = 0; i < features.count(); ++i) last_.emplace_back(features.u[i], features.v[i]);
+  if (pairs_.size() <= 2 * kAround) return;
+  measure();
+  pairs_.pop_front();
+}
+
+/// Adds the middle one of the pairs to the sums.
+void RowReadout::measure() {
+  // The rate at a pair from the means before and after it (Colella and Woodward 1984), and its binomial mean over five.
+  const auto rateAt = [&](std::size_t k) -> Eigen::Vector3d {
+    return (7.0 * (pairs_[k].rate + pairs_[k + 1].rate) - pairs_[k - 1].rate - pairs_[k + 2].rate) / 12.0;
+  };
+  const auto slowRateAt = [&](std::size_t k) -> Eigen::Vector3d {
+    return (rateAt(k - 2) + 4.0 * rateAt(k - 1) + 6.0 * rateAt(k) + 4.0 * rateAt(k + 1) + rateAt(k + 2)) / 16.0;
+  };
+  const Pair& pair = pairs_[kAround];
+  const StereoCamera& camera = pair.camera;
+  const Eigen::Isometry3d& T = pair.T_current_previous;
+  const std::array<Eigen::Vector3d, 2> rates = {rateAt(kAround - 1), rateAt(kAround)};
+  const std::array<Eigen::Vector3d, 2> slow_rates = {slowRateAt(kAround - 1), slowRateAt(kAround)};
+  std::vector<Shift> shifts;
+  for (const Seen& seen : pair.seen) {
+    const Eigen::Vector3d before = camera.backProject(seen.before.x(), seen.before.y(), seen.before.z());
+    const Eigen::Vector3d now = T * before;
+    if (!(now.z() > camera.nearestDepth())) continue;
+    const Eigen::Matrix<double, 2, 6> by_pose = motionJacobian(camera, T, before).topRows<2>();
+    const auto shiftBy = [&](const std::array<Eigen::Vector3d, 2>& rate) -> Eigen::Vector2d {
+      const Eigen::Vector3d moved = T.linear() * rate[0].cross(before);
+      return rowTime(camera, seen.before.y()) * by_pose.leftCols<3>() * moved -
+             rowTime(camera, seen.now.y()) * by_pose.rightCols<3>() * rate[1];
+    };
+    Shift& shift = shifts.emplace_back();
+    shift.derivative.topRows<6>() = by_pose.transpose();
+    shift.derivative.row(6) = shiftBy(rates).transpose(), shift.derivative.row(7) = shiftBy(slow_rates).transpose();
+    shift.residual = seen.now - camera.project(now).head<2>();
+  }
+  if (static_cast<int>(shifts.size()) < kFewestMeasured) return;
+
+  // Cauchy's kernel around the pair's own fit, which has the readout: else the largest shifts would weigh least.
+  constexpr int kPasses = 2;  // (chosen)
+  const double corner = NoiseOptions().corner, bend = noiseGate(2) * corner * corner;
+  using Vector = Eigen::Matrix<double, 8, 1>;
+  Vector fit = Vector::Zero(), by_residual;
+  if (information_ > 0.0) fit[6] = product_ / information_;
+  Eigen::Matrix<double, 8, 8> square;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    square.setZero(), by_residual.setZero();
+    for (const Shift& shift : shifts) {
+      const double weight = 1.0 / (bend + (shift.residual - shift.derivative.transpose() * fit).squaredNorm());
+      square += weight * shift.derivative * shift.derivative.transpose();
+      by_residual += weight * shift.derivative * shift.residual;
+    }
+    fit.head<7>() = square.topLeftCorner<7, 7>().ldlt().solve(by_residual.head<7>());
+  }
+  // The instrument, which has slow rates, without what the pose explains of it.
+  const Vector6d explained = square.topLeftCorner<6, 6>().ldlt().solve(square.topRightCorner<6, 1>());
+  const double information = square(6, 7) - explained.dot(square.block<6, 1>(0, 6));
+  const double product = by_residual[7] - explained.dot(by_residual.head<6>());
+  if (!std::isfinite(information) || !std::isfinite(product)) return;
+  constexpr double kMemory = RowDelay::kMemory, kForget = kMemory * kMemory;
+  information_ = kMemory * information_ + information;
+  product_ = kMemory * product_ + product;
+  information_square_ = kForget * information_square_ + information * information;
+  mixed_ = kForget * mixed_ + information * product;
+  product_square_ = kForget * product_square_ + product * product;
+}
+
+std::optional<RowReadout::Estimate> RowReadout::estimate() const {
+  // Rates that the readout itself biases: drives that follow hand_held 921 and 922 err by 0 to 6 % at 10 and 25 ms.
+  constexpr double kModel = 0.05;  // ratio of the value
+  if (!(information_ > 0.0)) return std::nullopt;
+  const double value = product_ / information_;
+  const double pairs = information_ * information_ / information_square_;  // effective number (Kish 1965)
+  const double spread = product_square_ - 2.0 * value * mixed_ + value * value * information_square_;
+  const double sigma = std::sqrt(std::max(spread, 0.0) * studentRatio(pairs)) / information_;
+  const Estimate estimate{value, std::hypot(sigma, kModel * value)};
+  if (!(estimate.sigma < RowDelay::kFail)) return std::nullopt;
+  return estimate;
+}
+
+double RowReadout::proved() const {
+  const auto known = estimate();
+  return known && known->sigma < kWarn && known->isRolling() ? known->value : 0.0;
+}
+
+}  // namespace sdvo
