@@ -344,7 +344,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, c
   if (outcome.starts_again) state_.startAgain();
   if (outcome.comes_back) state_.comeBack();
   if (outcome.is_seed) state_.covariance.beginMap();
-  const Belief belief = state_.doubt.weigh(*pair.scene(), found, evidence);
+  const Belief belief = state_.doubt.update(*pair.scene(), found, evidence);
   commit(*outcome.candidate, belief);
   Step step = measure(found, *outcome.candidate);
   const Matrix6d measured = step.covariance;
@@ -388,7 +388,7 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(PairSear
   const bool is_sound = !state_.doubt.lasts(), was_beyond_doubt = motions.isBeyondDoubt(found, most);
   Candidate candidate = adjust(pair, is_sound);
   const std::size_t adjusted = found.sightings.size();
-  found.reject(candidate.adjustment.rejected);
+  found.countInliers(candidate.adjustment.rejected);
   if (!was_beyond_doubt || motions.isBeyondDoubt(found, most)) return candidate;
   MotionScene suspected = *pair.scene();
   suspected.is_suspected = true;
@@ -398,7 +398,7 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(PairSear
   // Mostly the first motion prevails, and its adjustment is known.
   if (found.sightings.size() != adjusted || found.motion.T_current_reference.matrix() != T_adjusted.matrix())
     candidate = adjust(pair, is_sound);
-  found.reject(candidate.adjustment.rejected);
+  found.countInliers(candidate.adjustment.rejected);
   return candidate;
 }
 
