@@ -112,12 +112,12 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
 bool MotionSearch::isBeyondDoubt(const MotionHypothesis& found, double max_doubt) const {
   if (!found.motion.success || found.innovation > noiseGate(6) || logOddsWrong(found) > max_doubt) return false;
   const double agree = found.agreement.lasting_inliers;
-  const double lacking = kLastingAgreement * found.agreement.lasting_matches - agree;
-  if (lacking >= motion_options_.min_inliers) {
+  const double missing = kLastingAgreement * found.agreement.lasting_matches - agree;
+  if (missing >= motion_options_.min_inliers) {
     constexpr int kSightings = MotionHypothesis::kLastingSightings;
-    const int points = static_cast<int>(agree + lacking);
-    // A rival of the lacking points would not explain those that agree, and the reverse.
-    if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > kUnsuspected)
+    const int points = static_cast<int>(agree + missing);
+    // Log-odds of a rival that explains the missing points in place of those that agree.
+    if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * missing, points) > kUnsuspected)
       return false;
   }
   return 2 * found.agreement.inlier_sightings >= found.agreement.sightings && !endsAtRow(found);
@@ -283,7 +283,7 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
 void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
                           const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
   const std::vector<int> kept =
-      PoseProblem(scene.features.camera, measured, scene.noise.elsewhere()).inliers(T_lasting);
+      PoseProblem(scene.features.camera, measured, scene.noise.alignedGate()).inliers(T_lasting);
   std::vector<int> inliers, dropped;
   int dropped_sightings = 0;
   std::vector<LocalMap::Sighting> sightings;
