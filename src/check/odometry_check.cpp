@@ -38,8 +38,8 @@ Finding OdometryCheck::shutter() const {
   if (compensated_ != 0.0) return {Verdict::kOk, text(1, "a readout of ", 1e3 * compensated_, " ms is compensated")};
   const auto readout = readout_.estimate();
   if (!readout) return {Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
-  return judged(
-      false, readout->isRolling(),
+  return warnIf(
+      readout->isRolling(),
       text(1, "last row ", 1e3 * std::abs(readout->value), " +- ", 1e3 * readout->sigma, " ms ",
            readout->value > 0.0 ? "after" : "before", " the first"),
       text(4, "a rolling shutter: set calibration/readout to ", readout->value, ", or take cameras with a global one"));

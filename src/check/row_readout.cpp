@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kAround = 4;  // pairs before and after one, whose mean rates give the slow rate there
 
-/// Jacobian of a feature's position (u_left, v_left), px: by the pose, then its shifts for a readout of 1 s by the
-/// rates as they are and by slow ones.
+/// How a feature's position (u_left, v_left), px, depends on the pose and on the readout. A readout of 1 s shifts it by
+/// the camera's rate of rotation (last column of the Jacobian). The same shift by the slow rate is the instrument.
 struct Shift {
   Eigen::Matrix<double, 2, 7> by_pose_and_rate;
   Eigen::Vector2d by_slow_rate, residual;
@@ -110,7 +110,7 @@ void RowReadout::measure() {
     }
     fit = square.ldlt().solve(by_rest);
   }
-  // The instrument without what the pose explains of it.
+  // Product of instrument and shift, and of instrument and residual, without what the pose explains of them.
   const Vector6d explained = square.topLeftCorner<6, 6>().ldlt().solve(by_slow_rate.head<6>());
   const double information = by_slow_rate[6] - explained.dot(square.topRightCorner<6, 1>());
   const double product = rest - explained.dot(by_rest.head<6>());
