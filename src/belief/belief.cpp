@@ -28,8 +28,8 @@ std::string rivalWords(const MotionScene& scene, const MotionHypothesis& found) 
   return words.str();
 }
 
-/// Log-odds beyond those without evidence.
-double logBeyond(double log_odds) {
+/// Log of the odds less those without evidence: these are in logOddsWrong(), and each evidence would add them again.
+double logExcess(double log_odds) {
   return std::log(std::exp(log_odds) - std::exp(kUnsuspected));
 }
 
@@ -39,7 +39,7 @@ bool Doubt::lasts() const {
   return log_odds_ > kUnsuspected + std::log(2.0);
 }
 
-/// Causes exclude each other, so their odds add up.
+/// Adds the odds beyond those without evidence. Causes exclude each other, so their odds add up.
 void Doubt::raise(double odds, const std::string& cause) {
   const double unsuspected = std::exp(kUnsuspected);
   if (!(odds > unsuspected)) return;
@@ -59,36 +59,48 @@ void Doubt::fade() {
   if (!lasts()) distance_ = angle_ = largest_ = 0.0;
 }
 
-Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
-  const double rivals = std::min(-sdvo::logOdds(found.probability), kCertain), misled = logOddsMisled(found);
+/// Alternatives to the motion, its rivals first. `deviation`: second moment of its error if it is wrong.
+MotionMixture Doubt::alternatives(const MotionScene& scene, const MotionHypothesis& found,
+                                  const std::vector<Evidence>& evidence, const Matrix6d& deviation) const {
+  const double rivals = std::min(-sdvo::logOdds(found.probability), kCertain);
+  MotionMixture mixture;
+  mixture.add({rivals, Matrix6d::Zero(), rivalWords(scene, found)});  // their moment is found.rivals_moment
+  mixture.add({logOddsWrong(found), deviation, innovationWords(found) + ": followed is something else"});
+  for (const Evidence& each : evidence)
+    if (each.log_odds > kUnsuspected) mixture.add({logExcess(each.log_odds), deviation, each.cause});
+  mixture.add({log_odds_, deviation, "a moment ago " + cause_});
+  return mixture;
+}
+
+Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
+  // Lasting points that agree refute the doubt of earlier pairs.
   if (lasts()) log_odds_ = std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain);
+
   // Without a prior the camera may as well have stood.
   const ExpectedMotion expected = scene.prior.empty() ? ExpectedMotion() : scene.prior.front();
   const Vector6d innovation = expected.innovation(found.motion.T_current_reference.inverse());
   const Matrix6d deviation = momentOf(innovation) + expected.covariance;
-
-  MotionMixture mixture;
-  mixture.add({rivals, Matrix6d::Zero(), rivalWords(scene, found)});  // the pair has their moment already
-  mixture.add({misled, deviation, innovationWords(found) + ": followed is something else"});
-  for (const Evidence& each : evidence)
-    if (each.log_odds > kUnsuspected) mixture.add({logBeyond(each.log_odds), deviation, each.cause});
-  mixture.add({log_odds_, deviation, "a moment ago " + cause_});
-  raise(evidence);
+  const MotionMixture mixture = alternatives(scene, found, evidence, deviation);
+  const MotionMixture::Alternative &rivals = mixture.alternatives()[0], &wrong = mixture.alternatives()[1];
   Belief belief;
   belief.probability = mixture.probability();
   belief.moment = mixture.moment();
   std::ostringstream words;
   words << mixture.likeliest().cause << ": the motion is wrong with a probability of " << 1.0 - belief.probability;
   belief.reason = words.str();
-  raise(std::exp(rivals) + std::exp(misled), !found.rival || rivals < misled
-                                                 ? "the motion changed faster than a vehicle's can"
-                                             : found.rival->is_torn ? "the images seemed to be torn or damaged"
-                                                                    : "something else moved in view");
-  // Errors of successive motions that follow one mover add up.
+
+  // The pair's evidence is carried to the next ones.
+  raise(evidence);
+  raise(std::exp(rivals.log_odds) + std::exp(wrong.log_odds),
+        !found.rival || rivals.log_odds < wrong.log_odds ? "the motion changed faster than a vehicle's can"
+        : found.rival->is_torn                           ? "the images seemed to be torn or damaged"
+                                                         : "something else moved in view");
+
+  // Errors of successive motions that follow one mover add up in the pose.
   double distance = distance_ + std::sqrt(deviation.topLeftCorner<3, 3>().trace() / 3.0);
   double angle = angle_ + std::sqrt(deviation.bottomRightCorner<3, 3>().trace() / 3.0);
-  const double another = 1.0 - belief.probability - mixture.probability(mixture.alternatives().front());
-  belief.pose_moment = another * isotropic(distance * distance, angle * angle);
+  const double wrong_without_rivals = 1.0 - belief.probability - mixture.probability(rivals);
+  belief.pose_moment = wrong_without_rivals * isotropic(distance * distance, angle * angle);
   if (lasts()) distance_ = distance, angle_ = angle;
   return belief;
 }

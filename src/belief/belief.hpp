@@ -12,9 +12,9 @@ namespace sdvo {
 
 /// Something that may have misled a pair's motion.
 struct Evidence {
-  /// Log-odds that it did (`any`), bounded by those of certainty: nothing is more certain than the model behind it.
-  Evidence(double any, std::string named, bool may_last = false)
-      : log_odds(any > kUnsuspected ? std::min(any, kCertain) : kUnsuspected),
+  /// `unbounded`: log-odds that it did. They are bounded by kCertain: nothing is more certain than the model behind it.
+  Evidence(double unbounded, std::string named, bool may_last = false)
+      : log_odds(unbounded > kUnsuspected ? std::min(unbounded, kCertain) : kUnsuspected),
         cause(std::move(named)),
         lasts(may_last) {}
 
@@ -41,7 +41,7 @@ class Doubt {
   bool lasts() const;
 
   /// Posterior of a motion, by its rivals, the prior, the pair's own evidence and the carried doubt, which is updated.
-  Belief weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence);
+  Belief update(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence);
   /// Adds the evidence of a pair without a measured motion.
   void raise(const std::vector<Evidence>& evidence);
   /// Lets the doubt fade after a pair: a mover may leave the view.
@@ -49,6 +49,8 @@ class Doubt {
 
  private:
   void raise(double odds, const std::string& cause);
+  MotionMixture alternatives(const MotionScene& scene, const MotionHypothesis& found,
+                             const std::vector<Evidence>& evidence, const Matrix6d& deviation) const;
 
   double log_odds_ = kUnsuspected;
   std::string cause_;                    ///< that with the largest odds since the doubt began

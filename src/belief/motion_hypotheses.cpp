@@ -116,22 +116,9 @@ class Explanations {
     }
   }
 
-  /// Log-odds of hypothesis a against b, by the prior and the points that only one of them explains. Points of an
-  /// object count by their effective number, scattered ones each for itself. Where a row divides them, they may be of a
-  /// torn image and then do not count.
+  /// Log-odds of hypothesis a against b, by the prior and the points that only one of them explains.
   double logRatio(std::size_t a, std::size_t b) const {
-    double of_a = 0.0, of_b = 0.0;
-    for (std::size_t i = 0; i < sightings_.size(); ++i)
-      if (explained_[a][i] != explained_[b][i]) (explained_[a][i] ? of_a : of_b) += sightings_[i];
-    const Points only_a = explainedBy(a, b), only_b = explainedBy(b, a);
-    const int points = static_cast<int>(only_a.size() + only_b.size());
-    double images = kLogOddsOfSighting * (of_a - of_b);
-    if (areTorn(a, b))
-      images =
-          std::log((std::exp(logLikelihood(of_b, points)) + kTorn) / (std::exp(logLikelihood(of_a, points)) + kTorn));
-    else if (isObject(only_a, only_b) || isObject(only_b, only_a))
-      images = logLikelihood(of_b, points) - logLikelihood(of_a, points);
-    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + images;
+    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + logRatioOfPoints(a, b);
   }
 
   /// Whether two hypotheses are one motion for the inliers of both. Far points alone do not distinguish rotation from
@@ -146,11 +133,11 @@ class Explanations {
   }
 
   /// Whether a row separates the points of one hypothesis from those that only the other one explains. Each must
-  /// explain more than kGoodPart alone.
+  /// explain more than kSignificantRatio alone.
   bool areTorn(std::size_t a, std::size_t b) const {
     const Points of_a = explainedBy(a), of_b = explainedBy(b), only_a = explainedBy(a, b), only_b = explainedBy(b, a);
     const double all = static_cast<double>(of_a.size() + only_b.size());
-    if (static_cast<double>(std::min(only_a.size(), only_b.size())) < kGoodPart * all) return false;
+    if (static_cast<double>(std::min(only_a.size(), only_b.size())) < kSignificantRatio * all) return false;
     return areDivided(of_a, only_b) || areDivided(of_b, only_a);
   }
 
@@ -168,6 +155,20 @@ class Explanations {
   }
 
  private:
+  /// Log-likelihood ratio of hypotheses a and b, by the points that only one of them explains.
+  double logRatioOfPoints(std::size_t a, std::size_t b) const {
+    double sightings_a = 0.0, sightings_b = 0.0;
+    for (std::size_t i = 0; i < sightings_.size(); ++i)
+      if (explained_[a][i] != explained_[b][i]) (explained_[a][i] ? sightings_a : sightings_b) += sightings_[i];
+    const Points only_a = explainedBy(a, b), only_b = explainedBy(b, a);
+    const int points = static_cast<int>(only_a.size() + only_b.size());
+    const double likelihood_a = logLikelihood(sightings_b, points), likelihood_b = logLikelihood(sightings_a, points);
+    // Numbers are no evidence if the image is torn.
+    if (areTorn(a, b)) return std::log((std::exp(likelihood_a) + kTorn) / (std::exp(likelihood_b) + kTorn));
+    if (isObject(only_a, only_b) || isObject(only_b, only_a)) return likelihood_a - likelihood_b;
+    return kLogOddsOfSighting * (sightings_a - sightings_b);  // scattered points have independent errors
+  }
+
   /// Positions in the left image, px, that a hypothesis explains and `but` does not.
   Points explainedBy(std::size_t hypothesis, std::optional<std::size_t> but = {}) const {
     Points points;
@@ -195,7 +196,7 @@ struct RivalMotion {
 std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypothesis>& hypotheses,
                                   const Explanations& explanations, std::size_t likeliest, std::size_t chosen) {
   const std::vector<int> own = sorted(hypotheses[chosen].inlierFeatures());
-  const int left = hypotheses[chosen].agreement.matches - hypotheses[chosen].agreement.inliers;
+  const int outliers = hypotheses[chosen].agreement.matches - hypotheses[chosen].agreement.inliers;
   std::vector<RivalMotion> rivals;
   for (std::size_t k = 0; k < hypotheses.size(); ++k) {
     if (explanations.areOne(chosen, k)) continue;
@@ -203,7 +204,7 @@ std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypo
                       explanations.areTorn(chosen, k)};
     const int features = static_cast<int>(rival.features.size());
     const double chance = chanceOfAgreement(threshold, hypotheses[k].gate);
-    if (logFalseAlarms(std::max(left, features), features, chance) > std::log(kTailProbability)) continue;
+    if (logFalseAlarms(std::max(outliers, features), features, chance) > std::log(kTailProbability)) continue;
     const auto same = std::find_if(rivals.begin(), rivals.end(), [&](const RivalMotion& before) {
       return explanations.areOne(before.hypothesis, k);
     });
@@ -215,9 +216,9 @@ std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypo
   return rivals;
 }
 
-/// The chosen motion's probability, and the moment of the rivals around it.
-void compare(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses,
-             const std::vector<RivalMotion>& rivals, MotionHypothesis& chosen) {
+/// Sets the chosen motion's probability, its likeliest rival, and the moment of the rivals around it.
+void compareWithRivals(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses,
+                       const std::vector<RivalMotion>& rivals, MotionHypothesis& chosen) {
   const auto motionOf = [&](const RivalMotion& rival) -> const Eigen::Isometry3d& {
     return hypotheses[rival.hypothesis].motion.T_current_reference;
   };
@@ -261,7 +262,7 @@ double probabilityOf(double log_odds) {
   return 1.0 / (1.0 + std::exp(-log_odds));
 }
 
-PlaceBelief weigh(const FoundPlace& place, const std::vector<ExpectedMotion>& prior) {
+PlaceBelief choosePlace(const FoundPlace& place, const std::vector<ExpectedMotion>& prior) {
   const auto logWeight = [&](const Eigen::Isometry3d& T_current_newest) {
     double log_weight = prior.empty() ? 0.0 : std::log(kTailProbability);  // the prior may be wrong
     for (const ExpectedMotion& expected : prior)
@@ -287,17 +288,17 @@ int MotionHypothesis::sightingsOf(int match) const {
 }
 
 void MotionHypothesis::replaceMotion(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
-                                     const std::vector<int>& left) {
+                                     const std::vector<int>& dropped) {
   const Eigen::Isometry3d T_found = std::exchange(motion.T_current_reference, T_current_reference);
   const Eigen::Isometry3d apart = T_current_reference * T_found.inverse();
   const int points = static_cast<int>(motion.inliers.size());
   double own = 0.0, others = 0.0;
-  for (const int i : motion.inliers) (contains(left, matches[i].current) ? others : own) += sightingsOf(i);
-  const double misled = probabilityOf(logLikelihood(own, points) - logLikelihood(others, points));
-  rivals_moment += misled * momentOf(logSE3(apart));
+  for (const int i : motion.inliers) (contains(dropped, matches[i].current) ? others : own) += sightingsOf(i);
+  const double found_is_right = probabilityOf(logLikelihood(own, points) - logLikelihood(others, points));
+  rivals_moment += found_is_right * momentOf(logSE3(apart));
   if (isTolerable(scene, T_current_reference, apart)) return;
-  probability *= 1.0 - misled;
-  rival = {T_found, misled, left, false};
+  probability *= 1.0 - found_is_right;
+  rival = {T_found, found_is_right, dropped, false};
 }
 
 std::vector<int> MotionHypothesis::inlierFeatures(const std::vector<int>& rejected) const {
@@ -313,13 +314,13 @@ void MotionHypothesis::countAgreement() {
   agreement.lasting_matches = agreement.sightings = 0;
   for (int i = 0; i < agreement.matches; ++i)
     agreement.lasting_matches += isLasting(i), agreement.sightings += sightingsOf(i);
-  reject({});
+  countInliers();
 }
 
-void MotionHypothesis::reject(const std::vector<int>& features) {
+void MotionHypothesis::countInliers(const std::vector<int>& rejected) {
   agreement.inliers = agreement.lasting_inliers = agreement.inlier_sightings = 0;
   for (const int i : motion.inliers) {
-    if (contains(features, matches[i].current)) continue;
+    if (contains(rejected, matches[i].current)) continue;
     ++agreement.inliers;
     agreement.lasting_inliers += isLasting(i);
     agreement.inlier_sightings += sightingsOf(i);
@@ -357,9 +358,9 @@ bool agree(const StereoCamera& camera, const std::vector<Correspondence>& corres
   return 2 * static_cast<std::size_t>(same) > points.size();
 }
 
-double logLikelihood(double of_others, int points) {
+double logLikelihood(double unexplained, int points) {
   if (points == 0) return 0.0;
-  return -effectiveNumber(points) * kLogOddsOfSighting * of_others / points;
+  return -effectiveNumber(points) * kLogOddsOfSighting * unexplained / points;
 }
 
 double logAgreement(const Agreement& agreement) {
@@ -371,7 +372,7 @@ double logAgreement(const Agreement& agreement) {
           (1.0 - ratio) * std::log((1.0 - kLastingAgreement) / (1.0 - by_chance)));
 }
 
-double logOddsMisled(const MotionHypothesis& hypothesis) {
+double logOddsWrong(const MotionHypothesis& hypothesis) {
   return kUnsuspected - logPrior(hypothesis) - logAgreement(hypothesis.agreement);
 }
 
@@ -397,7 +398,7 @@ MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::v
     for (std::size_t k = 0; k < hypotheses.size(); ++k)
       if (by_inliers(hypotheses[largest], hypotheses[k]) && explanations.areOne(likeliest, k)) largest = k;
     chosen = hypotheses[largest];
-    compare(scene, hypotheses, rivalsOf(threshold, hypotheses, explanations, likeliest, largest), chosen);
+    compareWithRivals(scene, hypotheses, rivalsOf(threshold, hypotheses, explanations, likeliest, largest), chosen);
   }
   chosen.match_time = match_time, chosen.motion_time = motion_time;
   return chosen;

@@ -27,8 +27,8 @@ struct Agreement {
   int sightings = 0, inlier_sightings = 0;  ///< confirmed sightings of their points, each four at most
 };
 
-/// Log-odds that a measured motion is not the camera's (misled): without any evidence (probability of 0.001, chosen),
-/// and after an event that leaves a wrong map or rig.
+/// Log-odds that a measured motion is wrong: another thing's than the camera's. Without any evidence (probability of
+/// 0.001, chosen), and after an event that leaves a wrong map or rig: as likely as a right motion is without evidence.
 constexpr double kUnsuspected = -6.9, kCertain = -kUnsuspected;
 
 /// Probabilities as log-odds: log(p / (1 - p)).
@@ -43,7 +43,7 @@ struct PlaceBelief {
 
 /// Chooses between the place and the one that looks alike, by the `prior` of the motion. The other place stays an
 /// alternative; so does the prior's motion, in case that the map matches by chance.
-PlaceBelief weigh(const FoundPlace& place, const std::vector<ExpectedMotion>& prior);
+PlaceBelief choosePlace(const FoundPlace& place, const std::vector<ExpectedMotion>& prior);
 
 /// The input of a search for a pair's motion. The references must outlive it.
 struct MotionScene {
@@ -98,17 +98,17 @@ struct MotionHypothesis {
 
   /// Counts all matches, and the inliers, into `agreement`.
   void countAgreement();
-  /// Takes another motion. The motion before becomes the rival, supported by the inliers with the features `left`.
+  /// Counts the inliers alone again, without the rejected features of the pair.
+  void countInliers(const std::vector<int>& rejected = {});
+  /// Takes another motion. The motion before becomes the rival, supported by the inliers with the features `dropped`.
   void replaceMotion(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
-                     const std::vector<int>& left);
-  /// Counts the inliers again, without these features of the pair.
-  void reject(const std::vector<int>& features);
+                     const std::vector<int>& dropped);
 
   static constexpr int kLastingSightings = 4;
 };
 
-/// Ratio of all points (chosen) above which a group of them is more than wrong matches.
-constexpr double kGoodPart = 0.1;
+/// Ratio of all points (chosen): a smaller group may be wrong matches that agree by chance.
+constexpr double kSignificantRatio = 0.1;
 
 /// Ratio of lasting matches that agree with the camera's motion (chosen); others are wrong.
 constexpr double kLastingAgreement = 0.9;
@@ -142,15 +142,15 @@ double chanceOfAgreement(double threshold, double gate);
 bool agree(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
            const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within);
 
-/// Log-likelihood, up to a constant, of a motion that does not explain some of the `points`. `of_others`: the sum of
+/// Log-likelihood, up to a constant, of a motion that does not explain some of the `points`. `unexplained`: the sum of
 /// their confirmed sightings. Points of one mover have correlated errors, so their effective number scales the sum.
-double logLikelihood(double of_others, int points);
+double logLikelihood(double unexplained, int points);
 
 /// Log-likelihood ratio of the lasting points' agreement: under the camera's motion, against a mover's.
 double logAgreement(const Agreement& agreement);
 
-/// Log-odds that a motion is not the camera's, by this pair's innovation and agreement of lasting points.
-double logOddsMisled(const MotionHypothesis& hypothesis);
+/// Log-odds that a motion is wrong, by this pair's innovation and agreement of lasting points.
+double logOddsWrong(const MotionHypothesis& hypothesis);
 
 /// Weighs hypotheses by prior and likelihood, and merges those of one motion. Returns the likeliest with its rivals and
 /// the times of all. `threshold`, px: of an inlier.

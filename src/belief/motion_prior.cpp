@@ -72,7 +72,7 @@ double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) c
   const Vector6d second = logSE3(motion), now = second / dt;
   const Vector6d first = *velocity_ + second / velocity_interval_;
   const Matrix6d measured = 2.0 * dt * dt * velocity_covariance_;  // of two motions
-  // Bounded by the probability that the prior is wrong.
+  // Of a change of the velocity, bounded by the probability that the prior is wrong.
   const auto cost = [&](const Vector6d& from, const Vector6d& to) {
     const double square = around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), measured);
     return std::min(0.5 * square, -std::log(kTailProbability));
@@ -80,7 +80,7 @@ double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) c
   return cost(*before_, *velocity_) + cost(*velocity_, now) - cost(*before_, first) - cost(first, -now);
 }
 
-Matrix6d MotionPrior::unseen(double seconds) const {
+Matrix6d MotionPrior::outageCovariance(double seconds) const {
   const Vector6d velocity = confirmed_.value_or(Vector6d::Zero());
   const auto spread = [&](double speed, double acceleration, double most) {
     const double t = seconds;
@@ -90,7 +90,7 @@ Matrix6d MotionPrior::unseen(double seconds) const {
                    spread(velocity.tail<3>().norm(), options_.rotation_acceleration, CV_PI));
 }
 
-Matrix6d MotionPrior::unseen(double seconds, double dt) const {
+Matrix6d MotionPrior::lastStepCovariance(double seconds, double dt) const {
   const Vector6d velocity = confirmed_.value_or(Vector6d::Zero());
   const auto spread = [&](double speed, double acceleration, double most) {
     return std::min(speed * speed + acceleration * acceleration * seconds, most * most) * dt * dt;
@@ -99,7 +99,7 @@ Matrix6d MotionPrior::unseen(double seconds, double dt) const {
                    spread(velocity.tail<3>().norm(), options_.rotation_acceleration, options_.max_rotation_rate));
 }
 
-Matrix6d MotionPrior::unknown() const {
+Matrix6d MotionPrior::unmeasuredCovariance() const {
   constexpr double kTurn = 0.5;  // rad (chosen)
   const double longest = options_.max_speed * options_.max_gap;
   return isotropic(longest * longest, kTurn * kTurn);

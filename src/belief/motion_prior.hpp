@@ -59,16 +59,16 @@ class MotionPrior {
   double logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const;
 
   /// Covariance, m^2 and rad^2, of the motion over so many seconds without images; its mean is standstill. It starts at
-  /// the confirmed speed in any direction. max_speed and half a turn bound it.
-  Matrix6d unseen(double seconds) const;
+  /// the confirmed speed in any direction. The distance at max_speed and half a turn bound it.
+  Matrix6d outageCovariance(double seconds) const;
 
-  /// The same of the motion in the last `dt` s of these. max_speed and max_rotation_rate bound it, so unlike the
-  /// growth of unseen() it never ends.
-  Matrix6d unseen(double seconds, double dt) const;
+  /// Covariance of the motion in the last `dt` s of these alone. The distance at max_speed and the angle at
+  /// max_rotation_rate over `dt` bound it.
+  Matrix6d lastStepCovariance(double seconds, double dt) const;
 
-  /// Covariance, m^2 and rad^2, of a motion without any measurement. The standard deviations are the distance at
+  /// Covariance, m^2 and rad^2, of a motion that nothing measures. The standard deviations are the distance at
   /// max_speed over max_gap, and half a radian.
-  Matrix6d unknown() const;
+  Matrix6d unmeasuredCovariance() const;
 
   /// Reason, if a motion over `dt` s exceeds a limit by more than its noise and stamps allow; else empty.
   std::string tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const;
@@ -88,8 +88,7 @@ class MotionPrior {
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
   MotionPriorOptions options_;
-  std::optional<Vector6d> velocity_, before_,
-      confirmed_;  ///< m/s and rad/s; `before_` is of the motion before the last
+  std::optional<Vector6d> velocity_, before_, confirmed_;  ///< m/s and rad/s; `before_`: the last but one
   Matrix6d velocity_covariance_ = Matrix6d::Zero(), confirmed_covariance_ = Matrix6d::Zero();
   Matrix6d doubt_ = Matrix6d::Zero();                          ///< see takeVelocity(): m and rad
   std::int64_t confirmed_stamp_ = 0;                           ///< ns

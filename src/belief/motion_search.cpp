@@ -34,7 +34,7 @@ bool endsAtRow(const MotionHypothesis& found) {
   const auto outliers = static_cast<int>(without(beyond, found.motion.inliers).size());
   const double matches = static_cast<double>(found.correspondences.size());
   const double share = 1.0 - static_cast<double>(rows.size()) / matches;
-  return outliers > kGoodPart * matches &&
+  return outliers > kSignificantRatio * matches &&
          binomialTail(static_cast<int>(beyond.size()), outliers, share) < kTailProbability;
 }
 
@@ -55,24 +55,26 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   const double view_time = stopwatch.lap();
   MotionHypothesis found = searchNear(scene, view, expected, max_doubt);
   found.match_time += view_time;
-  for (bool is_chosen = false;; is_chosen = true) {
-    if (is_chosen)
-      found = chooseMotion(scene, options(scene).inlier_threshold, compete(scene, view, std::move(found)));
-    else if (scene.is_suspected || !isBeyondDoubt(found, max_doubt))
-      continue;
-    if (!found.motion.success) return found;
-    stopwatch.lap();
-    Alignment aligned = align(scene, found);
-    const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(scene, aligned, found);
-    found.motion_time += stopwatch.lap();
-    const bool is_another =
-        T_lasting && !isTolerable(scene, *T_lasting, *T_lasting * aligned.T_current_reference.inverse());
-    if (is_another && !is_chosen) continue;
-    found.motion.T_current_reference = aligned.T_current_reference;
-    found.sightings = std::move(aligned.sightings);
-    if (T_lasting) keepTo(scene, *T_lasting, aligned.measured, found);
-    return found;
-  }
+  const bool needs_rivals = scene.is_suspected || !isBeyondDoubt(found, max_doubt);
+  if (!needs_rivals && refineByPatches(scene, false, found)) return found;
+  found = chooseMotion(scene, options(scene).inlier_threshold, compete(scene, view, std::move(found)));
+  if (found.motion.success) refineByPatches(scene, true, found);
+  return found;
+}
+
+/// Refines the motion on aligned patches, and keeps to the lasting points' own motion if that differs. Unless it
+/// `may_change` beyond tolerance, returns false in that case and leaves the motion.
+bool MotionSearch::refineByPatches(const MotionScene& scene, bool may_change, MotionHypothesis& found) const {
+  Stopwatch stopwatch;
+  Alignment aligned = align(scene, found);
+  const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(scene, aligned, found);
+  found.motion_time += stopwatch.lap();
+  const bool changes = T_lasting && !isTolerable(scene, *T_lasting, *T_lasting * aligned.T_current_reference.inverse());
+  if (changes && !may_change) return false;
+  found.motion.T_current_reference = aligned.T_current_reference;
+  found.sightings = std::move(aligned.sightings);
+  if (T_lasting) keepTo(scene, *T_lasting, aligned.measured, found);
+  return true;
 }
 
 /// Searches the other hypotheses: the expected motion may have misled the first search, and movers may have more points
@@ -108,13 +110,14 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
 /// Prior and lasting points do not contradict, and the majority agrees with the motion, all over the image. The lasting
 /// outliers beyond kLastingAgreement would be no serious rival even if they moved together.
 bool MotionSearch::isBeyondDoubt(const MotionHypothesis& found, double max_doubt) const {
-  if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(found) > max_doubt) return false;
+  if (!found.motion.success || found.innovation > noiseGate(6) || logOddsWrong(found) > max_doubt) return false;
   const double agree = found.agreement.lasting_inliers;
-  const double lacking = kLastingAgreement * found.agreement.lasting_matches - agree;
-  if (lacking >= motion_options_.min_inliers) {
+  const double missing = kLastingAgreement * found.agreement.lasting_matches - agree;
+  if (missing >= motion_options_.min_inliers) {
     constexpr int kSightings = MotionHypothesis::kLastingSightings;
-    const int points = static_cast<int>(agree + lacking);
-    if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > kUnsuspected)
+    const int points = static_cast<int>(agree + missing);
+    // Log-odds of a rival that explains the missing points in place of those that agree.
+    if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * missing, points) > kUnsuspected)
       return false;
   }
   return 2 * found.agreement.inlier_sightings >= found.agreement.sightings && !endsAtRow(found);
@@ -136,7 +139,8 @@ MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPt
   return found;
 }
 
-/// Whether the motion puts more than kGoodPart of the points outside of the search radius around the prediction.
+/// Whether the motion puts more than kSignificantRatio of the points outside of the search radius around the
+/// prediction.
 bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted,
                               const MotionHypothesis& found) const {
   const StereoCamera& camera = scene.features.camera;
@@ -150,7 +154,7 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
     ++seen;
     outside += (pixel - camera.project(expected)).head<2>().norm() > matcher_.options().gate_radius;
   }
-  return static_cast<double>(outside) > kGoodPart * static_cast<double>(seen);
+  return static_cast<double>(outside) > kSignificantRatio * static_cast<double>(seen);
 }
 
 MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const MotionScene& scene, const ViewPtr& view,
@@ -165,7 +169,7 @@ MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const Motio
   found.match_time = stopwatch.lap();
   found.correspondences = correspond(view->points, scene.features, found.matches, scene.calibration);
   found.motion = estimator_.estimate(camera, found.correspondences, T_current_reference, scene.noise.scale());
-  weigh(scene, found);
+  assess(scene, found);
   found.motion_time = stopwatch.lap();
   return found;
 }
@@ -181,7 +185,7 @@ MotionHypothesis MotionSearch::searchAmong(const MotionScene& scene, const Motio
   for (const int i : subset) some.push_back(all.correspondences[static_cast<std::size_t>(i)]);
   found.motion = estimator_.estimate(scene.features.camera, some, std::nullopt, scene.noise.scale());
   if (found.motion.success) found.motion.inliers = agreeing(scene, all, found.motion.T_current_reference);
-  weigh(scene, found);
+  assess(scene, found);
   found.motion_time = stopwatch.lap();
   return found;
 }
@@ -194,7 +198,7 @@ std::vector<int> MotionSearch::agreeing(const MotionScene& scene, const MotionHy
 }
 
 /// Sets agreement and innovation. A motion that chance explains fails.
-void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) const {
+void MotionSearch::assess(const MotionScene& scene, MotionHypothesis& found) const {
   found.countAgreement();
   if (!found.motion.success) return;
   found.motion.reason = chanceWords(scene, found);
@@ -279,26 +283,26 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
 void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
                           const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
   const std::vector<int> kept =
-      PoseProblem(scene.features.camera, measured, scene.noise.elsewhere()).inliers(T_lasting);
-  std::vector<int> inliers, left;
-  int left_sightings = 0;
+      PoseProblem(scene.features.camera, measured, scene.noise.alignedGate()).inliers(T_lasting);
+  std::vector<int> inliers, dropped;
+  int dropped_sightings = 0;
   std::vector<LocalMap::Sighting> sightings;
   for (int k = 0; k < static_cast<int>(measured.size()); ++k) {
     const int i = found.motion.inliers[static_cast<std::size_t>(k)];
     if (!std::binary_search(kept.begin(), kept.end(), k)) {
-      left.push_back(found.matches[static_cast<std::size_t>(i)].current);
-      left_sightings += found.sightingsOf(i);
+      dropped.push_back(found.matches[static_cast<std::size_t>(i)].current);
+      dropped_sightings += found.sightingsOf(i);
       continue;
     }
     inliers.push_back(i);
     sightings.push_back(found.sightings[static_cast<std::size_t>(k)]);
   }
-  found.replaceMotion(scene, T_lasting, left);
+  found.replaceMotion(scene, T_lasting, dropped);
   found.motion.inliers = std::move(inliers);
   found.sightings = std::move(sightings);
   found.countAgreement();
-  found.agreement.matches -= static_cast<int>(left.size());
-  found.agreement.sightings -= left_sightings;
+  found.agreement.matches -= static_cast<int>(dropped.size());
+  found.agreement.sightings -= dropped_sightings;
 }
 
 }  // namespace sdvo

@@ -55,7 +55,8 @@ class MotionSearch {
                                const std::vector<int>& subset) const;
   std::vector<int> agreeing(const MotionScene& scene, const MotionHypothesis& all,
                             const Eigen::Isometry3d& T_current_reference) const;
-  void weigh(const MotionScene& scene, MotionHypothesis& found) const;
+  void assess(const MotionScene& scene, MotionHypothesis& found) const;
+  bool refineByPatches(const MotionScene& scene, bool may_change, MotionHypothesis& found) const;
   Alignment align(const MotionScene& scene, const MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> motionOfLasting(const MotionScene& scene, const Alignment& aligned,
                                                    MotionHypothesis& found) const;

@@ -36,7 +36,7 @@ Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
 
 }  // namespace
 
-Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation) {
+Matrix6d missingCovariance(const Matrix6d& covariance, const Vector6d& deviation) {
   constexpr double kExpected = 3.0;  // half the mean of chi-square of six: a deviation is a part of the error
   if (!(mahalanobisSquare(deviation, covariance) > kExpected)) return Matrix6d::Zero();
   return deviation * deviation.transpose() + kTolerableRatio * kTolerableRatio * momentOf(deviation);
@@ -48,8 +48,8 @@ Matrix6d PoseCovariance::momentOf(const Exposure& exposure, const RigEstimate& k
   return derivative * known.covariance * derivative.transpose() + deviation * deviation.transpose();
 }
 
-Matrix6d PoseCovariance::expose(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate& known,
-                                const RigEstimate::Vector& compensated) {
+Matrix6d PoseCovariance::updateExposure(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate& known,
+                                        const RigEstimate::Vector& compensated) {
   const Exposure before = exposure_;
   exposure_ = keyframe_exposure_;
   exposure_.leftCols<RigEstimate::kParameters>() += since_keyframe;
@@ -62,8 +62,8 @@ void PoseCovariance::walkRig(const RigEstimate& known, const RigEstimate::Matrix
   regress(known, known.covariance * (known.covariance + step).inverse());
 }
 
-/// Expresses poses by the rig after a step: the rig before it is known.mean + kept * (rig - known.mean) and a remainder
-/// that the rig does not tell.
+/// Expresses poses by the rig after a step. The rig before it is known.mean + kept * (rig - known.mean), and a
+/// remainder that is independent of the rig.
 void PoseCovariance::regress(const RigEstimate& known, const RigEstimate::Matrix& kept) {
   const RigEstimate::Matrix gone = RigEstimate::Matrix::Identity() - kept;
   const auto express = [&](Exposure& exposure, Matrix6d& covariance) {
@@ -77,8 +77,8 @@ void PoseCovariance::regress(const RigEstimate& known, const RigEstimate::Matrix
   express(keyframe_exposure_, keyframe_);
 }
 
-void PoseCovariance::cover(const Vector6d& correction) {
-  spread(lacking(value(), correction));  // the next poses are measured from the same key frame
+void PoseCovariance::coverCorrection(const Vector6d& correction) {
+  inflate(missingCovariance(value(), correction));  // the next poses are measured from the same key frame
 }
 
 void PoseCovariance::beginMap() {
@@ -102,13 +102,13 @@ void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
     *exposure = adjoint(T_previous_current.inverse()) * *exposure;
 }
 
-void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {
+void PoseCovariance::predict(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {
   carry(T_previous_current);
-  doubt(covariance, covariance);
+  addDoubt(covariance, covariance);
 }
 
-Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe,
-                                 const Matrix6d& growth) {
+Matrix6d PoseCovariance::update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe,
+                                const Matrix6d& growth) {
   const Matrix6d before = measured_;
   carry(T_previous_current);
   const Matrix6d motion = unmeasured_ + (since_keyframe_ ? covering(*since_keyframe_, since_keyframe) : since_keyframe);
@@ -119,7 +119,7 @@ Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, co
   return motion;
 }
 
-void PoseCovariance::doubt(const Matrix6d& motion, const Matrix6d& pose) {
+void PoseCovariance::addDoubt(const Matrix6d& motion, const Matrix6d& pose) {
   doubted_ += pose;
   unmeasured_ += motion;
 }

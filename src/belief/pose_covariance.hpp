@@ -10,7 +10,7 @@ namespace sdvo {
 
 /// The covariance to add so that the sum explains a deviation: its outer product, and kTolerableRatio of it in every
 /// direction. Zero if its squared Mahalanobis distance is at most half of the mean (chi-square of six).
-Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation);
+Matrix6d missingCovariance(const Matrix6d& covariance, const Vector6d& deviation);
 
 /// Covariance of a pose that is reported pair by pair while its map is corrected. All covariances are of right
 /// perturbations, T * exp(xi), translation before rotation, in m and rad.
@@ -34,16 +34,16 @@ class PoseCovariance {
   Matrix6d byRig(const RigEstimate& known) const { return momentOf(exposure_, known); }
 
   /// The map corrected the last pose by this right perturbation: widens the covariance to explain it.
-  void cover(const Vector6d& correction);
+  void coverCorrection(const Vector6d& correction);
 
   /// Widens the last pose and all poses that are measured in the same map.
-  void spread(const Matrix6d& moment) {
+  void inflate(const Matrix6d& moment) {
     measured_ += moment;
     keyframe_ += moment;
   }
 
   /// The last pose is set, with this covariance, as the key frame of a new map.
-  void assume(const Matrix6d& covariance) {
+  void reset(const Matrix6d& covariance) {
     *this = PoseCovariance();
     measured_ = keyframe_ = covariance;
   }
@@ -53,32 +53,33 @@ class PoseCovariance {
   void beginMap();
 
   /// The pose moved by an unmeasured motion of this covariance, as a prediction.
-  void advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
+  void predict(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
 
   /// The pose moved and was measured against the key frame with the covariance `since_keyframe`. `growth`: by how much
   /// its covariance in the map exceeds the key frame's. Returns the covariance of the motion between the two reported
-  /// poses. After a key frame, this is `since_keyframe`. Otherwise both poses have the key frame's noise, which
-  /// cancels. Its covariance is that of the better pose, because its points have been seen as often. So the larger
-  /// covariance since the key frame remains. Predictions and doubts of the previous pose are added.
-  Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
+  /// poses. After a key frame, this is `since_keyframe`. Otherwise both poses share the key frame's noise, which
+  /// cancels in the motion. It is as large as the better pose's own noise, because the points were seen as often. The
+  /// sum of both poses' own noise is then the larger covariance since the key frame. Predictions and doubts of the
+  /// previous pose are added.
+  Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
   /// The same in a map of one key frame.
-  Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
-    return measure(T_previous_current, since_keyframe, since_keyframe);
+  Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
+    return update(T_previous_current, since_keyframe, since_keyframe);
   }
 
   /// Derivative of the last measured pose by the rig since the key frame (right perturbation), and the rig that was
   /// compensated. Returns the second moment that the `known` rig has in the motion between the two reported poses.
-  Matrix6d expose(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate& known,
-                  const RigEstimate::Vector& compensated);
+  Matrix6d updateExposure(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate& known,
+                          const RigEstimate::Vector& compensated);
 
   /// The rig walked by a random step of this covariance after it was `known`. Poses depend on the rig before the step,
-  /// which the rig after it tells in part.
+  /// which correlates with the rig after it.
   void walkRig(const RigEstimate& known, const RigEstimate::Matrix& step);
-  /// The rig is another one: it tells nothing of the one that was `known`.
+  /// The rig is another one, independent of the one that was `known`.
   void changeRig(const RigEstimate& known) { regress(known, RigEstimate::Matrix::Zero()); }
 
   /// Adds second moments of doubt to the last motion and pose, until the next pose is measured in the map.
-  void doubt(const Matrix6d& motion, const Matrix6d& pose);
+  void addDoubt(const Matrix6d& motion, const Matrix6d& pose);
 
   /// The last pose is a key frame: the next ones are measured against it, without its doubt.
   void markKeyframe();

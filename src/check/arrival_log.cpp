@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kFastest = 200.0;   // arrivals a second on each topic (chosen): more are no camera's
 constexpr double kLately = 5.0;      // s (chosen), of losses and rates
-constexpr double kPatience = 1.0;    // s (chosen) beyond the longest wait of a pair so far
+constexpr double kGrace = 1.0;       // s (chosen) that an image waits for its partner beyond the longest wait so far
 constexpr double kLate = 0.1;        // s between messages of one stamp (chosen): a queue is too short, perhaps
 constexpr double kHalf = 0.45;       // ratio of a period: images of one pair are nearer; below 0.5, for jitter
 constexpr double kOtherClock = 1.0;  // s between stamps and arrivals (chosen): no camera takes as long
@@ -112,7 +112,7 @@ void ArrivalLog::giveUp(Input input, Arrival& arrival) {
 void ArrivalLog::giveUpWhatIsOld(double now) {
   for (const Input input : {kLeftImage, kRightImage})
     for (Arrival& arrival : topics_[input].arrivals)
-      if (arrival.fate == Fate::kWaits && arrival.now < now - kPatience - longest_wait_) giveUp(input, arrival);
+      if (arrival.fate == Fate::kWaits && arrival.now < now - kGrace - longest_wait_) giveUp(input, arrival);
 }
 
 ArrivalLog::Use ArrivalLog::usedSince(double begin) const {
@@ -176,7 +176,7 @@ Finding ArrivalLog::checkPairs(double now, double max_gap, Values& values) {
                text(2, static_cast<double>(lately) / std::clamp(now - begin_, 1.0, kLately)));
   }
   if (!loss.empty() && (!silence || silence->isFault())) return {Verdict::kWarn, loss};
-  return judged(false, !silence && gap > max_gap,
+  return warnIf(!silence && gap > max_gap,
                 silence ? kNoPairs : text(1, "left and right are up to ", 1e3 * gap, " ms apart"), kTrigger);
 }
 
@@ -239,7 +239,7 @@ Finding ArrivalLog::checkStamps() const {
     return {Verdict::kWarn, what, cause.empty() ? std::string(kTrigger) + ", or " + kLosses : cause.substr(2)};
   }
   const auto gaps = std::count_if(periods.begin(), periods.end(), [&](double period) { return period > 1.5 * usual; });
-  return judged(false, static_cast<double>(gaps) > kFewLost * static_cast<double>(periods.size()), what,
+  return warnIf(static_cast<double>(gaps) > kFewLost * static_cast<double>(periods.size()), what,
                 std::string("pairs are missing: ") + kLosses);
 }
 
@@ -266,10 +266,11 @@ ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) con
   return gaps;
 }
 
-/// The likely cause and a remedy, by the stamps of images without a pair.
+/// The likely cause and a remedy, by the stamps of images without a pair. The first cause that most of them show.
 std::string ArrivalLog::advise(double begin) const {
   const Gaps right = gapsBetween(kLeftImage, kRightImage, begin), left = gapsBetween(kRightImage, kLeftImage, begin);
   if (topics_[kLeftImage].arrivals.empty() || topics_[kRightImage].arrivals.empty()) return "";  // the counts show it
+  // Stamps of left and right differ by more than pairing allows.
   if (2 * right.apart > right.all)
     return text(1, "; the nearest stamps of left and right are ", 1e3 * right.least, " to ", 1e3 * right.most,
                 " ms apart, more than ", options_.pairing.approximate_sync ? "max_interval (" : "sync_tolerance (",
@@ -277,11 +278,13 @@ std::string ArrivalLog::advise(double begin) const {
            (options_.pairing.approximate_sync ? ""
                                               : text(3, ": set sync_tolerance to ", right.most + 0.001,
                                                      " if one trigger takes both, else approximate_sync to true"));
+  // Images of one side are missing.
   for (const auto& [gaps, sides] :
        {std::pair(right, " left images have no right one"), std::pair(left, " right images have no left one")})
     if (2 * gaps.missing > gaps.all)
       return "; " + std::to_string(gaps.missing) + sides +
              " within half a period: does the driver or the network lose images, or stamp them wrong?";
+  // A camera_info is missing, or has other stamps than its images.
   const Gaps* latest = &right;
   std::array<Gaps, 2> infos;
   for (const Input input : {kLeftInfo, kRightInfo}) {

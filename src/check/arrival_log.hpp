@@ -65,7 +65,9 @@ class ArrivalLog {
   /// Whether stamps are of the clock of arrivals, increase, have no gaps, and have partners.
   Finding checkStamps() const;
   double pairRate() const;  ///< by the stamps, Hz; zero when it is not known
-  ArrivalFindings findings(const Finding& transform) { return {checkTopics(), checkStamps(), transform, pairRate(), {}}; }
+  ArrivalFindings findings(const Finding& transform) {
+    return {checkTopics(), checkStamps(), transform, pairRate(), {}};
+  }
 
  private:
   /// A message waits for its partners until its pair is complete, or until it is too old for one. kCounted: lost, and
@@ -94,7 +96,6 @@ class ArrivalLog {
     double delay = 0.0;                                                  ///< largest between arrivals of one stamp
   };
 
-  /// Of stamps in a pair, s.
   double period() const;
   std::vector<double> pairPeriods() const;
   bool isEarly(const Arrival& arrival) const;
@@ -116,7 +117,7 @@ class ArrivalLog {
   std::int64_t first_stamp_ = 0;  ///< from which on all topics have messages, ns; 0: some have none
   double complete_ = 0.0;         ///< arrival of the first message of the last topic
   double longest_wait_ = 0.0;     ///< of a message for its pair
-  double largest_gap_ = 0.0;      ///< s, between the stamps of a pair since the last takeLargestGap()
+  double largest_gap_ = 0.0;      ///< s, between the stamps of a pair since the last checkPairs()
   bool has_pairs_ = false, has_ended_ = false;
 };
 

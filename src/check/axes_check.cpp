@@ -13,7 +13,7 @@ Finding checkMount(const std::string& base_frame, const std::string& camera_fram
   const Eigen::Vector3d at = T_base_camera.translation(), ahead = T_base_camera.linear().col(2);
   if (camera_frame == base_frame && base_frame != "base_link") return {Verdict::kOk, "the base is the camera"};
   // An optical frame looks along +z, on a robot seldom up.
-  return judged(false, T_base_camera.linear().isIdentity(1e-3),
+  return warnIf(T_base_camera.linear().isIdentity(1e-3),
                 text(2, camera_frame, " is at ", at.x(), " ", at.y(), " ", at.z(), " m of ", base_frame,
                      " and looks along ", ahead.x(), " ", ahead.y(), " ", ahead.z()),
                 "camera frame '" + camera_frame +

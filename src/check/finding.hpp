@@ -30,9 +30,16 @@ struct Finding {
   std::string text() const { return remedy.empty() ? what : what + ": " + remedy; }
 };
 
+/// FAIL if it fails, else WARN if it is doubtful, else OK without the remedy.
 inline Finding judged(bool fails, bool is_doubtful, const std::string& what, const std::string& remedy = "") {
   if (!fails && !is_doubtful) return {Verdict::kOk, what};
   return {fails ? Verdict::kFail : Verdict::kWarn, what, remedy};
+}
+inline Finding failIf(bool fails, const std::string& what, const std::string& remedy) {
+  return judged(fails, false, what, remedy);
+}
+inline Finding warnIf(bool is_doubtful, const std::string& what, const std::string& remedy) {
+  return judged(false, is_doubtful, what, remedy);
 }
 
 using Findings = std::vector<Finding>;

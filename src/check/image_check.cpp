@@ -97,7 +97,7 @@ Finding RepeatCheck::judge() const {
   const bool is_right = sides_[1].alone > sides_[0].alone;
   const int alone = sides_[is_right ? 1 : 0].alone;
   if (alone <= kFew * pairs_)
-    return judged(false, together_ > kFew * pairs_,
+    return warnIf(together_ > kFew * pairs_,
                   text(0, "in ", together_, " of ", pairs_, " pairs both images repeat bit by bit"),
                   "the driver is frozen or sends images twice; a simulated camera that stands needs noise");
   return {Verdict::kFail,
@@ -112,11 +112,11 @@ Finding checkExposure(double dark, double bright, bool takes_turns, double min_i
   if (dark < min_intensity)
     return {bright < min_intensity ? Verdict::kFail : Verdict::kWarn, what,
             "too dark: light, longer exposure or more gain"};
-  return judged(false, bright > max_intensity, what, kTooBright);
+  return warnIf(bright > max_intensity, what, kTooBright);
 }
 
 Finding checkCorners(double corners, int least, const std::string& more) {
-  return judged(corners < least, false, text(0, corners, " corners") + more,
+  return failIf(corners < least, text(0, corners, " corners") + more,
                 "focus, light, or a scene with texture; a lower detector/min_contrast");
 }
 
@@ -166,7 +166,7 @@ Finding ImageCheck::texture(int min_corners, double min_share) const {
                                     " % are found in the right image"));
   if (usual.isFault()) return usual;
   if (few < min_corners) return {Verdict::kWarn, usual.what, "some views have hardly any texture"};
-  return judged(false, share < min_share, usual.what,
+  return warnIf(share < min_share, usual.what,
                 "the scene is nearer than stereo/epipolar/max_disparity reaches, or repeats itself");
 }
 
@@ -184,7 +184,7 @@ Finding ImageCheck::blur() const {
     return {Verdict::kOpen, "the camera did not move enough", "turn with it, and hold it still"};
   const double ratio = quantile(moving, 0.5) / std::max(quantile(still, 0.5), 1e-6);
   const std::string what = text(0, "fast views have ", 100.0 * ratio, " % of the sharpness of slow ones");
-  return judged(false, ratio < kBlurred, what, "shorter exposure (10 ms or less), more light or gain");
+  return warnIf(ratio < kBlurred, what, "shorter exposure (10 ms or less), more light or gain");
 }
 
 Finding ImageCheck::frameRate(const std::vector<double>& rotations) const {
@@ -236,7 +236,7 @@ Finding EmitterCheck::judge() const {
   if (stayed_.size() < kEnough) return {Verdict::kOpen, "the camera did not move enough", "turn and walk with it"};
   const double stayed = quantile(stayed_, 0.5);
   const std::string what = text(0, 100.0 * std::max(stayed, 0.0), " % of the bright dots move with the camera");
-  return judged(stayed > kPattern, false, what,
+  return failIf(stayed > kPattern, what,
                 "switch the pattern projector off (RealSense: emitter_enabled 0): its dots say that nothing moves. "
                 "Mask text that is printed into the images");
 }

@@ -16,7 +16,7 @@ constexpr std::size_t kFewest = 3;  // arrivals (chosen) that make one
 
 Finding checkRate(const std::string& what, double rate, const RateOptions& usual) {
   const std::string usually = text(1, usual.min_rate, " to ", usual.max_rate, " Hz are expected");
-  return judged(false, rate < usual.min_rate || rate > usual.max_rate, what,
+  return warnIf(rate < usual.min_rate || rate > usual.max_rate, what,
                 usually + (rate > usual.max_rate ? "" : ", 15 Hz or more for fast turns: driver or network too slow?"));
 }
 
@@ -31,7 +31,7 @@ Finding checkLatency(double latency, double most, const std::string& done, doubl
             "without use_sim_time and --clock? Let the driver stamp with the system's"};
   if (latency > most)
     return {Verdict::kWarn, what, "is the machine too slow, or are the clocks of two machines different?"};
-  return judged(false, latency < -ahead, what,
+  return warnIf(latency < -ahead, what,
                 "the images are stamped in the future, where TF knows nothing yet: is the camera's clock that of this "
                 "machine?");
 }

@@ -79,7 +79,7 @@ Finding MosaicCheck::judge() const {
   if (pairs_ == 0) return {Verdict::kOpen, "no pairs"};
   const std::string what = text(0, 100.0 * left_, " % of the left image have a pattern of two pixels, ", 100.0 * right_,
                                 " % of the right one");
-  return judged(!problem().empty(), false, what, problem());
+  return failIf(!problem().empty(), what, problem());
 }
 
 }  // namespace sdvo

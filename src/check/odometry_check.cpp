@@ -40,10 +40,10 @@ Finding OdometryCheck::shutter() const {
   const std::string what = text(1, "last row ", 1e3 * std::abs(value), " +- ", 1e3 * sigma, " ms ",
                                 value > 0.0 ? "after" : "before", " the first");
   if (told_ != 0.0)
-    return judged(false, RowReadout::Estimate{value - told_, sigma}.isRolling(),
+    return warnIf(RowReadout::Estimate{value - told_, sigma}.isRolling(),
                   what + text(1, ", compensated as ", 1e3 * told_, " ms"),
                   text(4, "set calibration/readout to ", value));
-  return judged(false, readout_->isRolling(), what,
+  return warnIf(readout_->isRolling(), what,
                 text(4, "a rolling shutter, compensated once it was known: set calibration/readout to ", value,
                      ", then it is from the start"));
 }

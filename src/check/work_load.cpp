@@ -11,7 +11,7 @@ constexpr const char* kRelief = "set fewer detector/max_features, take smaller i
 }  // namespace
 
 Finding checkLoad(double load, double most, const std::string& more) {
-  return judged(false, load > most, text(0, 100.0 * load, " % of one processor's time") + more, kRelief);
+  return warnIf(load > most, text(0, 100.0 * load, " % of one processor's time") + more, kRelief);
 }
 
 void WorkLoad::noteWait(const std::string& what, double time) {

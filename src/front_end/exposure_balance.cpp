@@ -15,14 +15,14 @@ constexpr int kLevels = 256;
 
 /// Parts of the images, row by row.
 constexpr int kColumns = 8, kRows = 6;
-using Parts = std::array<double, kColumns * kRows>;
+using ValueOfParts = std::array<double, kColumns * kRows>;
 
 /// Logarithm of the right part's mean grey level by the left one's.
-Parts logRatios(const cv::Mat& left, const cv::Mat& right) {
+ValueOfParts logRatios(const cv::Mat& left, const cv::Mat& right) {
   cv::Mat means[2];
   cv::resize(left, means[0], {kColumns, kRows}, 0.0, 0.0, cv::INTER_AREA);
   cv::resize(right, means[1], {kColumns, kRows}, 0.0, 0.0, cv::INTER_AREA);
-  Parts ratios;
+  ValueOfParts ratios;
   const std::uint8_t *of_left = means[0].ptr(), *of_right = means[1].ptr();
   for (std::size_t i = 0; i < ratios.size(); ++i) ratios[i] = std::log((of_right[i] + 1.0) / (of_left[i] + 1.0));
   return ratios;
@@ -69,7 +69,7 @@ void balanceExposures(double left_mean, double right_mean, cv::Mat& left, cv::Ma
   if (darker < kDark || brighter <= (1.0 + kTolerance) * darker) return;
   // A part that is covered on one side has another ratio; it is left out of the histograms.
   constexpr double kCovered = 2.0;  // factor between its ratio and that of most parts (chosen)
-  const Parts ratios = logRatios(left, right);
+  const ValueOfParts ratios = logRatios(left, right);
   const double usual = quantile({ratios.begin(), ratios.end()}, 0.5);
   if (std::abs(usual) <= std::log1p(kTolerance)) return;
   std::array<bool, kColumns * kRows> counting;

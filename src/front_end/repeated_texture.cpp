@@ -10,18 +10,19 @@
 namespace sdvo {
 namespace {
 
-/// Whether the texture in view repeats: a sequential test (Wald 1945) of matches with a rival, here and there. Of
-/// these, 0.05 to 0.16 have a period by chance, and nearly all where texture repeats.
+/// Whether the texture in view repeats: a sequential test (Wald 1945) of matches with a rival, spread over the list.
+/// The ratio of these that have a period is 0.05 to 0.16 by chance, and nearly one where texture repeats.
 bool isRepeated(const std::vector<std::size_t>& with_rival, const PeriodOf& periodOf) {
-  // Parts of 0.15 and 0.6 are told apart: a period has twice the log-odds of none. One view in 4,000 is wrong at 0.15.
+  // The test decides between ratios of 0.15 and 0.6, where a period has twice the log-odds of none. One view in 4,000
+  // is wrong at 0.15.
   constexpr int kPeriod = 2, kNone = -1, kUnique = -3, kRepeated = 12;
   constexpr std::size_t kMost = 24;
   int evidence = 0;
   for (std::size_t k = 0; k < std::min(kMost, with_rival.size()) && evidence > kUnique && evidence < kRepeated; ++k) {
     constexpr double kGolden = 0.618034;  // multiples of it modulo 1 spread evenly, however many
-    const double part = kGolden * static_cast<double>(k), count = static_cast<double>(with_rival.size());
+    const double turns = kGolden * static_cast<double>(k), count = static_cast<double>(with_rival.size());
     evidence +=
-        periodOf(with_rival[static_cast<std::size_t>((part - std::floor(part)) * count)]) > 0.f ? kPeriod : kNone;
+        periodOf(with_rival[static_cast<std::size_t>((turns - std::floor(turns)) * count)]) > 0.f ? kPeriod : kNone;
   }
   return evidence >= kRepeated;
 }

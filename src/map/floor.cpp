@@ -47,8 +47,9 @@ double Floor::weight(double square) {
 }
 
 Eigen::Matrix<double, 6, 3> Floor::gain(const Jacobian& jacobian, const Matrix6d& covariance) const {
-  const Eigen::Matrix3d innovation = jacobian * covariance * jacobian.transpose() + Eigen::Matrix3d::Identity();
-  return innovation.ldlt().solve(jacobian * covariance).transpose();
+  const Eigen::Matrix3d innovation_covariance =
+      jacobian * covariance * jacobian.transpose() + Eigen::Matrix3d::Identity();
+  return innovation_covariance.ldlt().solve(jacobian * covariance).transpose();
 }
 
 Eigen::Isometry3d Floor::settled(const Eigen::Isometry3d& T_camera_origin, const Matrix6d& covariance) const {

@@ -160,7 +160,7 @@ void LocalMap::renewAppearance(const StereoFeatures& features, const std::vector
   for (Point& point : points_) {
     const FrameObservation& last = point.observations.back();
     const Sighting* sighting = last.frame_id == newestId() ? of_feature[last.feature] : nullptr;
-    if (!sighting) continue;  // not seen, cut off or just started
+    if (!sighting) continue;  // not seen, rejected or just started
     takeDescriptor(point, features, last.feature);
     const double change = std::max(sighting->scale, 1.0 / sighting->scale);
     if (sighting->aligned && change > kRenewal)
@@ -230,10 +230,11 @@ bool LocalMap::needsKeyframe() const {
 /// Removes key frames that are older than the `keyframes` newest ones: the oldest that shares too few points with the
 /// newest pair, and while they are too many, the one with the least parallax to the frame before.
 void LocalMap::forgetKeyframe() {
+  // Number of frames before these newest ones and the newest pair.
   const auto older = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
   const std::size_t leaving = older() - 1;
-  if (frames_[leaving].id > last_left_) {
-    last_left_ = frames_[leaving].id;
+  if (frames_[leaving].id > last_leaving_) {
+    last_leaving_ = frames_[leaving].id;
     if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled) {
       OldKeyframe old = keyframe(frames_[leaving]);
       // With fewer points it could not be recalled.
@@ -405,23 +406,25 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   window.calibration_prior = prior;
   window.floor = floor;
 
-  std::vector<int> poses;  // whose covariances are needed below
-  for (const int pose : {newest, newest - 1})
-    if (pose > 0) poses.push_back(pose);
+  const int keyframe = newest - 1;  // the last one; pose 0 is held fixed
+  std::vector<int> poses{newest};   // whose covariances are needed below
+  if (keyframe > 0) poses.push_back(keyframe);
   const WindowSolution& solution = optimizer.optimize(window, poses);
   if (!solution.success) return adjustment;
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
   adjustment.common_disparity_square = solution.common_disparity_square;
-  const auto motion = [&](int from, int to) {
+  const auto covarianceOfMotion = [&](int from, int to) {
     return motionCovariance(window, poses, solution.pose_covariance, from, to);
   };
-  adjustment.since_keyframe = motion(newest - 1, newest);
+  adjustment.since_keyframe = covarianceOfMotion(keyframe, newest);
   const Eigen::Isometry3d T_newest_keyframe =
-      window.T_camera_origin[newest] * window.T_camera_origin[newest - 1].inverse();
-  adjustment.growth = positivePart(motion(0, newest) - carried(T_newest_keyframe, motion(0, newest - 1)));
+      window.T_camera_origin[newest] * window.T_camera_origin[keyframe].inverse();
+  const Matrix6d keyframe_in_newest = carried(T_newest_keyframe, covarianceOfMotion(0, keyframe));
+  adjustment.growth = positivePart(covarianceOfMotion(0, newest) - keyframe_in_newest);
+  // Right perturbation of the motion by left ones of its two poses: as in motionCovariance().
   adjustment.by_calibration = -solution.pose_by_calibration.topRows<6>();
-  if (poses.size() > 1)
+  if (keyframe > 0)
     adjustment.by_calibration += adjoint(T_newest_keyframe) * solution.pose_by_calibration.bottomRows<6>();
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
@@ -432,7 +435,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   for (const int i : problem.newest) newest_squares.push_back(solution.squares[i]);
   adjustment.newest_measured = static_cast<int>(newest_squares.size());
   adjustment.newest_square = median(newest_squares);
-  cutOff(problem, solution.squares, adjustment);
+  rejectOutliers(problem, solution.squares, adjustment);
   return adjustment;
 }
 
@@ -441,7 +444,7 @@ double LocalMap::varianceOfMotion() const {
   return frames_.size() < 2 ? newest : 0.5 * (newest + frames_[frames_.size() - 2].variance);
 }
 
-void LocalMap::cutOff(const Problem& problem, const std::vector<double>& squares, Adjustment& adjustment) {
+void LocalMap::rejectOutliers(const Problem& problem, const std::vector<double>& squares, Adjustment& adjustment) {
   const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as its observation's
   for (const int i : problem.newest) {
     // The sigma of a corner that no patch confirms allows for a neighbour's corner. The gate does not: the point's own

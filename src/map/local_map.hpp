@@ -110,10 +110,11 @@ class LocalMap {
   /// Result of adjust().
   struct Adjustment {
     bool success = false;
-    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the motion from the last key frame.
-    /// By how much the covariance of the newest pose, in the map, exceeds that of this key frame.
+    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the motion from the last key frame
+    /// By how much the covariance of the newest pose, relative to the window's first one, exceeds the key frame's.
     Matrix6d growth = Matrix6d::Zero();
-    RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();  ///< of the same motion
+    /// Derivative of the motion from the last key frame by the calibration, m/px and rad/px.
+    RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
     std::vector<int> rejected;                      ///< features of the newest pair
@@ -179,7 +180,7 @@ class LocalMap {
   /// Whether a point is matched with new pairs: if the map has two observations of it, or a recent one.
   static bool isLookedFor(const Point& point, int since);
   void removeFrame(std::size_t index);
-  void cutOff(const Problem& problem, const std::vector<double>& squares, Adjustment& adjustment);
+  void rejectOutliers(const Problem& problem, const std::vector<double>& squares, Adjustment& adjustment);
   bool needsKeyframe() const;
   static void takeDescriptor(Point& point, const StereoFeatures& features, int feature);
   void startPoint(const StereoFeatures& features, int feature, int id, const Eigen::Isometry3d& T_camera_origin,
@@ -191,7 +192,7 @@ class LocalMap {
   std::deque<Frame> frames_;
   std::vector<Point> points_;
   KeyframeMemory memory_;
-  int last_left_ = -1;  ///< id of the newest key frame that is older than the `keyframes` newest ones
+  int last_leaving_ = -1;  ///< id of the newest key frame that is older than the `keyframes` newest ones
 };
 
 }  // namespace sdvo

@@ -191,7 +191,9 @@ struct AddPoint {
                                  double* squares, EliminatedPoint* result) {
     constexpr double kLeastInformation = 1e-9;  // keeps H invertible if no observation constrains a direction
     const double rho = point->ray_and_inverse_depth.z();
-    // Sums over the observations: a lane for each number of the point, or of the calibration.
+    // With poses x, the point p and the calibration c, the equations have the blocks H_xx, H_xp, H_pp and so on.
+    // 1. Sum over the observations, a lane for each number of p or c: H_pp, H_cp, H_cc and the gradients. H_xx and H_xc
+    // are added to the equations at once; H_xp = J_pose^T W J_point is kept in the factors.
     DoubleLanes of_H[3] = {}, of_g = {}, of_both[3] = {}, of_disparity = {}, of_shapes[3] = {}, of_shape = {};
     double weight = 0.0, disparity_residual = 0.0;
     int observations = 0, count = 0;
@@ -234,6 +236,7 @@ struct AddPoint {
       store(of_H[k], H[k]), store(of_both[k], by_calibration[k]), store(of_shapes[k], calibration[k]);
     store(of_g, g), store(of_shape, of_calibration), store(of_disparity, disparity_by_point);
 
+    // 2. Factor H_pp, damped: R = L^-1. `reduced` is R g_p.
     const double baseline = projection->camera.baseline;
     const double least[3] = {kLeastInformation, kLeastInformation, kLeastInformation * baseline * baseline};
     for (int k = 0; k < 3; ++k) H[k][k] = H[k][k] * (1.0 + linearisation->damping) + least[k];
@@ -247,6 +250,7 @@ struct AddPoint {
         reduced_calibration[k][l] =
             R[k][0] * by_calibration[0][l] + R[k][1] * by_calibration[1][l] + R[k][2] * by_calibration[2][l];
     }
+    // 3. Schur complement: subtract H_cp H_pp^-1 H_pc and H_cp H_pp^-1 g_p, with H_pp^-1 = R^T R.
     const Eigen::Index tail = equations->gradient_.size() - kCalibration;
     for (int k = 0; k < kCalibration; ++k) {
       for (int m = 0; m < 3; ++m) {
@@ -257,6 +261,7 @@ struct AddPoint {
       for (int l = 0; l <= k; ++l) equations->of_calibration_(k, l) += calibration[k][l];
     }
 
+    // 4. The same for poses: Y = H_xp R^T, and subtract the products of the Y of each two poses, Y R H_pc and Y R g_p.
     for (int k = 0; k < count; ++k) {
       PoseFactor& factor = factors[k];
       double* Y = factor.Y.data();

@@ -202,28 +202,33 @@ class WindowOptimizer::Solver {
   /// pose. `poses`: those whose covariance is needed.
   bool covariances(const std::vector<int>& poses) {
     const int size = 6 * poses_ + kCalibration;
-    known_.setZero(size, size);  // information of the priors, without the points'
-    addPriors(known_, gradient_);
+    // Information of the priors alone, which the sandwich leaves as it is; then the second derivatives at the result.
+    priors_.setZero(size, size);
+    addPriors(priors_, gradient_);
     const auto [bread, meat] = sandwichScale();
     equations_.writeHessian(hessian_);
-    hessian_ = bread * hessian_ + known_;
+    hessian_ = bread * hessian_ + priors_;
     factor_.compute(hessian_);
     if (factor_.info() != Eigen::Success) return false;
 
+    // Columns of the inverse: those of the poses that are asked for, and the calibration's.
     const int asked = 6 * static_cast<int>(poses.size());
     units_.setZero(size, asked + kCalibration);
     for (int k = 0; k < asked; ++k) units_(6 * (poses[static_cast<std::size_t>(k / 6)] - 1) + k % 6, k) = 1.0;
     units_.bottomRightCorner<kCalibration, kCalibration>().setIdentity();
     solved_ = factor_.solve(units_);
     const RigCalibration::Matrix of_calibration = solved_.bottomRightCorner<kCalibration, kCalibration>();
-    const RigCalibration::Matrix certainty = of_calibration.inverse();
-    solution_.calibration_information = (certainty - window_->calibration_prior.information) / bread;
-    solution_.pose_by_calibration = units_.leftCols(asked).transpose() * solved_.rightCols<kCalibration>() * certainty;
+    const RigCalibration::Matrix information = of_calibration.inverse();
+    solution_.calibration_information = (information - window_->calibration_prior.information) / bread;
+    solution_.pose_by_calibration =
+        units_.leftCols(asked).transpose() * solved_.rightCols<kCalibration>() * information;
 
+    // The poses' covariance has a part by the priors' information and one by the points'; the sandwich scales the
+    // latter.
     const auto of_poses = solved_.leftCols(asked);
-    const Eigen::MatrixXd of_known = of_poses.transpose() * known_.selfadjointView<Eigen::Lower>() * of_poses;
-    const Eigen::MatrixXd of_points = units_.leftCols(asked).transpose() * of_poses - of_known;
-    solution_.pose_covariance = meat * meatOverBread(of_poses, of_points) * of_points + of_known;
+    const Eigen::MatrixXd of_priors = of_poses.transpose() * priors_.selfadjointView<Eigen::Lower>() * of_poses;
+    const Eigen::MatrixXd of_points = units_.leftCols(asked).transpose() * of_poses - of_priors;
+    solution_.pose_covariance = meat * meatOverBread(of_poses, of_points) * of_points + of_priors;
     return solution_.pose_covariance.allFinite();
   }
 
@@ -260,10 +265,10 @@ class WindowOptimizer::Solver {
     return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
   }
 
-  /// Correction of a sum of squares over n clusters, before clusters of different size are compared. The gradients sum
-  /// up to zero, which makes the sum smaller by (n - 1) / n. The largest of several sums is too large by chance: it is
-  /// divided by the mean of 6 n squared normal numbers plus its standard deviation.
-  static double largerArea(double clusters) {
+  /// Correction of a sum of squares over n larger clusters, before it is compared with that over smaller ones. The
+  /// gradients sum up to zero, which makes the sum smaller by (n - 1) / n. The largest of several sums is too large by
+  /// chance: it is divided by the mean of 6 n squared normal numbers plus its standard deviation.
+  static double correctionOfClusters(double clusters) {
     return clusters / std::max(clusters - 1.0, 1.0) / (1.0 + std::sqrt(2.0 / (6.0 * std::max(clusters, 1.0))));
   }
 
@@ -272,28 +277,28 @@ class WindowOptimizer::Solver {
   /// areas of two and four times the width are tried, and the largest sum counts.
   double meatOf(const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
     constexpr int kSide = 64;  // clusters along each axis at most
-    clusters_.clear();
     const double scale = window_->camera.fx / kPart;
     const auto index = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kSide / 2), 0, kSide - 1); };
     gradients_.resize(points_.size());
     sumGradients(points_, factors_, by, gradients_);
+    clusters_.clear();  // one for each point; each pass merges those in the same cell of a grid that is twice as coarse
     for (std::size_t p = 0; p < points_.size(); ++p)
       clusters_.push_back({index(estimate_.points[p].x()), index(estimate_.points[p].y()), gradients_[p].head<6>()});
     double most = 0.0;
     for (int side = kSide; side >= kSide / 4; side /= 2) {
       cluster_at_.assign(side * side, -1);
       int count = 0;
-      for (const Cluster& part : clusters_) {
-        int& at = cluster_at_[part.y * side + part.x];
+      for (const Cluster& smaller : clusters_) {
+        int& at = cluster_at_[smaller.y * side + smaller.x];
         if (at < 0)
-          at = count, clusters_[count++] = part;
+          at = count, clusters_[count++] = smaller;
         else
-          clusters_[at].gradient += part.gradient;
+          clusters_[at].gradient += smaller.gradient;
       }
       clusters_.resize(count);
       double sum = 0.0;
       for (Cluster& cluster : clusters_) sum += cluster.gradient.squaredNorm(), cluster.x /= 2, cluster.y /= 2;
-      most = std::max(most, side < kSide ? sum * largerArea(count) : sum);
+      most = std::max(most, side < kSide ? sum * correctionOfClusters(count) : sum);
     }
     return most;
   }
@@ -357,7 +362,7 @@ class WindowOptimizer::Solver {
   std::vector<Cluster> clusters_;
   std::vector<FactorColumn> gradients_;
   std::vector<int> cluster_at_;
-  Eigen::MatrixXd damped_, known_, units_, solved_;
+  Eigen::MatrixXd damped_, priors_, units_, solved_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Eigen::VectorXd step_;
   std::vector<double> squares_, common_squares_;

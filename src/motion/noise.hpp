@@ -37,7 +37,7 @@ class Noise {
   double sameMotion() const { return scale_ * options_.length(); }
 
   /// px: two aligned positions that are further apart are not of one point.
-  double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * NoiseOptions::kReference; }
+  double alignedGate() const { return std::sqrt(2.0 * noiseGate(2)) * NoiseOptions::kReference; }
 
   /// Takes in the square, in standard deviations (chi-square of six), by which the motions of two parts of a confirmed
   /// motion's inliers differ.
@@ -68,11 +68,12 @@ class Noise {
     return std::max(square, kMedian / (kMost * kMost));
   }
 
-  static constexpr double kMost = 2.0;        // ratio of standard deviations, and its inverse the least (chosen)
-  static constexpr double kUnknownRig = 4.0;  // ratio; the learnt one of real and rendered drives is 1 to 19 (KITTI 01)
+  static constexpr double kMost = 2.0;  // ratio of standard deviations, and its inverse the least (chosen)
+  // Ratio before any pair is learnt; the learnt one of real and rendered drives is 1 to 19 (KITTI 01).
+  static constexpr double kSharedAtFirst = 4.0;
   NoiseOptions options_;
   double scale_ = 1.0;
-  double shared_ = kUnknownRig;
+  double shared_ = kSharedAtFirst;
   double usual_square_ = 0.0;
 };
 

@@ -78,7 +78,7 @@ void OdometryState::interrupt() {
 void OdometryState::recover(const VisualOdometryOptions& options) {
   OdometryState fresh(options, epoch);
   fresh.T_origin_camera = sound.T_origin_camera;
-  fresh.covariance.assume(sound.pose_covariance);
+  fresh.covariance.reset(sound.pose_covariance);
   fresh.distance = sound.distance;
   fresh.camera = camera, fresh.lens = lens, fresh.last_stamp = last_stamp, fresh.last_pose_stamp = last_pose_stamp;
   fresh.pairs = pairs, fresh.started = started;
@@ -91,9 +91,9 @@ void OdometryState::startAgain() {
   map.reset();
   ++epoch;
   const std::int64_t last = last_pose_stamp.value_or(seed->newestStamp());
-  const Matrix6d unseen = prior.unseen(static_cast<double>(seed->newestStamp() - last) * 1e-9);
+  const Matrix6d unseen = prior.outageCovariance(static_cast<double>(seed->newestStamp() - last) * 1e-9);
   covariance.beginMap();
-  covariance.spread(prior.unknown() + unseen);
+  covariance.inflate(prior.unmeasuredCovariance() + unseen);
   last_pose_stamp = seed->newestStamp();
 }
 

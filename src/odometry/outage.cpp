@@ -50,7 +50,7 @@ Matrix6d Outage::covarianceOf(const MotionGuess& guess, const Matrix6d& process_
 }
 
 Matrix6d Outage::growth(const MotionPrior& prior, double dt) const {
-  return prior.unseen(seconds_) - prior.unseen(seconds_ - dt);
+  return prior.outageCovariance(seconds_) - prior.outageCovariance(seconds_ - dt);
 }
 
 void Outage::end() {

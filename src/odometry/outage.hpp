@@ -29,7 +29,7 @@ class Outage {
   /// Covariance, m^2 and rad^2, by which the unknown motion of the outage grew in the last `dt` s.
   Matrix6d growth(const MotionPrior& prior, double dt) const;
   /// That of the unknown motion in the last `dt` s alone.
-  Matrix6d last(const MotionPrior& prior, double dt) const { return prior.unseen(seconds_, dt); }
+  Matrix6d last(const MotionPrior& prior, double dt) const { return prior.lastStepCovariance(seconds_, dt); }
 
   int predictedPairs() const { return predicted_pairs_; }
   void countPrediction() { ++predicted_pairs_; }

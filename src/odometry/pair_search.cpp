@@ -282,7 +282,7 @@ std::optional<MotionScene> PairSearch::reacquired() const {
     const double since = map->secondsUntil(features());
     if (!place || !state_.prior.tooFast(place->T_current_newest.inverse(), Matrix6d::Zero(), since).empty()) continue;
     scene.emplace(sceneOf(*map, 0.0, std::nullopt));
-    scene->place = weigh(*place, scene->prior);
+    scene->place = choosePlace(*place, scene->prior);
     scene->T_current_reference = scene->place->T_current_newest;
     scene->prior.clear();
     return scene;

@@ -25,7 +25,7 @@ OdometryStep follow(const ExpectedMotion& expected, const std::string& reason, O
   step.reason = reason;
   step.T_previous_current = expected.motion;
   step.covariance = expected.covariance;
-  state.covariance.advance(expected.motion, expected.covariance);
+  state.covariance.predict(expected.motion, expected.covariance);
   return step;
 }
 
@@ -81,7 +81,7 @@ OdometryStep holdPose(double dt, OdometryState& state) {
                     : "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
   step.T_previous_current = Eigen::Isometry3d::Identity();
   step.covariance = state.outage.last(state.prior, dt);
-  state.covariance.advance(*step.T_previous_current, state.outage.growth(state.prior, dt));
+  state.covariance.predict(*step.T_previous_current, state.outage.growth(state.prior, dt));
   state.prior.interrupt();
   return step;
 }

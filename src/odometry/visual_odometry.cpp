@@ -185,14 +185,14 @@ void VisualOdometry::Impl::mountAt(const Eigen::Isometry3d& T_base_camera) {
   state_.forgetMaps();  // they are in the old camera's axes
   state_.forgetRig(options_);
   state_.T_origin_camera = orthonormalised(T_before_now.inverse() * state_.T_origin_camera * T_before_now);
-  state_.covariance.advance(T_before_now, Matrix6d::Zero());
+  state_.covariance.predict(T_before_now, Matrix6d::Zero());
 }
 
 void VisualOdometry::Impl::takePose(const Matrix6d& covariance) {
   OdometryResult given;
   given.has_pose = true, given.pose_covariance = covariance;
   if (const std::string defect = given.defect(); !defect.empty()) throw std::invalid_argument(defect);
-  state_.covariance.assume(covariance);
+  state_.covariance.reset(covariance);
   state_.left.reset();  // its poses are from before
   ++state_.epoch;
   if (!state_.interrupted) return;
@@ -346,7 +346,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, c
   if (outcome.starts_again) state_.startAgain();
   if (outcome.comes_back) state_.comeBack();
   if (outcome.is_seed) state_.covariance.beginMap();
-  const Belief belief = state_.doubt.weigh(*pair.scene(), found, evidence);
+  const Belief belief = state_.doubt.update(*pair.scene(), found, evidence);
   commit(*outcome.candidate, belief);
   Step step = measure(found, *outcome.candidate);
   const Matrix6d measured = step.covariance;
@@ -390,7 +390,7 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(PairSear
   const bool is_sound = !state_.doubt.lasts(), was_beyond_doubt = motions.isBeyondDoubt(found, most);
   Candidate candidate = adjust(pair, is_sound);
   const std::size_t adjusted = found.sightings.size();
-  found.reject(candidate.adjustment.rejected);
+  found.countInliers(candidate.adjustment.rejected);
   if (!was_beyond_doubt || motions.isBeyondDoubt(found, most)) return candidate;
   MotionScene suspected = *pair.scene();
   suspected.is_suspected = true;
@@ -400,7 +400,7 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(PairSear
   // Mostly the first motion prevails, and its adjustment is known.
   if (found.sightings.size() != adjusted || found.motion.T_current_reference.matrix() != T_adjusted.matrix())
     candidate = adjust(pair, is_sound);
-  found.reject(candidate.adjustment.rejected);
+  found.countInliers(candidate.adjustment.rejected);
   return candidate;
 }
 
@@ -445,7 +445,7 @@ void VisualOdometry::Impl::widen(const PairSearch& pair, const Belief& belief, S
   const MotionHypothesis& found = pair.found();
   const auto add = [&](const Matrix6d& motion, const Matrix6d& pose) {
     step.covariance += motion;
-    state_.covariance.doubt(motion, pose);
+    state_.covariance.addDoubt(motion, pose);
   };
   add(found.rivals_moment, found.rivals_moment);
   add(unexpected(scene, found), Matrix6d::Zero());  // stamps change the velocity, not the pose
@@ -453,7 +453,7 @@ void VisualOdometry::Impl::widen(const PairSearch& pair, const Belief& belief, S
   if (!scene.place) return;
   const Matrix6d of_places = scene.place->mixture.moment();
   step.covariance += of_places;
-  state_.covariance.spread(of_places);
+  state_.covariance.inflate(of_places);
 }
 
 /// Reason, if a motion has too small a probability or too large a covariance; else empty.
@@ -500,21 +500,21 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::measure(const MotionHypothesis&
   step.T_previous_current = (map.newestPose() * state_.T_origin_camera).inverse();
   if (!candidate.adjustment.success) {
     step.covariance = found.motion.covariance;
-    state_.covariance.advance(*step.T_previous_current, step.covariance);
+    state_.covariance.predict(*step.T_previous_current, step.covariance);
     return step;
   }
-  step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
-                                              candidate.adjustment.growth);
-  const Matrix6d by_rig = state_.covariance.expose(
+  step.covariance = state_.covariance.update(*step.T_previous_current, candidate.adjustment.since_keyframe,
+                                             candidate.adjustment.growth);
+  const Matrix6d by_rig = state_.covariance.updateExposure(
       candidate.adjustment.by_calibration * candidate.calibration_by_rig, state_.rig.calibration.estimate(),
       RigEstimate::of(*state_.camera, candidate.calibration, candidate.delay));
   // The motion between two reported poses includes the map's correction of the first one. It is found as a perturbation
   // of the key frame, and reported as one of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
                     logSE3(candidate.T_keyframe_origin * map.poseBeforeNewest().inverse());
-  state_.covariance.cover(step.correction);
+  state_.covariance.coverCorrection(step.correction);
   const bool by_chance = mahalanobisSquare(step.correction, step.covariance) <= noiseGate(6);
-  step.covariance += lacking(step.covariance, step.correction) + by_rig;
+  step.covariance += missingCovariance(step.covariance, step.correction) + by_rig;
   if (by_chance) return step;
   std::ostringstream reason;
   reason << "the map corrected the pose by " << step.correction.head<3>().norm() << " m and "
@@ -535,7 +535,7 @@ void VisualOdometry::Impl::rememberRolled(PairSearch& pair, Step& step) {
   } else {
     const Matrix6d moment = state_.shutter.momentOf(rolled);
     step.covariance += moment;
-    state_.covariance.doubt(moment, moment);
+    state_.covariance.addDoubt(moment, moment);
   }
   if (state_.newest && rolled.mean) state_.shutter.learn(*state_.newest, *rolled.mean);
   state_.newest = std::move(pair.rolled());

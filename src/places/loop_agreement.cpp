@@ -8,7 +8,7 @@ namespace sdvo {
 namespace {
 
 constexpr std::size_t kRemembered = 20;
-constexpr double kLongestWay = 20.0;         // m (chosen) travelled between the ends of two loops
+constexpr double kLongestPath = 20.0;        // m (chosen) travelled between the ends of two loops
 constexpr double kLargestTranslation = 0.5;  // m (chosen) between the camera's positions by two loops
 constexpr double kLargestRotation = 2.0;     // deg (chosen) between its orientations by them
 
@@ -16,8 +16,8 @@ constexpr double kLargestRotation = 2.0;     // deg (chosen) between its orienta
 
 std::vector<GraphEdge> LoopAgreement::confirm(const PoseGraph& graph, const GraphEdge& proposal) {
   const auto& nodes = graph.nodes();
-  const std::set<int> near_from = graph.near(proposal.from, kLongestWay);
-  const std::set<int> near_to = graph.near(proposal.to, kLongestWay);
+  const std::set<int> near_from = graph.near(proposal.from, kLongestPath);
+  const std::set<int> near_to = graph.near(proposal.to, kLongestPath);
   // Nodes that were removed meanwhile are in neither set.
   const auto agrees = [&](const GraphEdge& earlier) {
     if (near_from.count(earlier.from) == 0 || near_to.count(earlier.to) == 0 || earlier.to == proposal.to) return false;

@@ -26,14 +26,14 @@ Matrix6d unknown() {
 
 }  // namespace
 
-struct PlaceRecognition::Parts {
+struct PlaceRecognition::Tools {
   PlaceIndex index;
   PlaceVerifier verifier;
   LoopAgreement agreement;
 };
 
 PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options)
-    : options_(checked(options)), parts_(std::make_unique<Parts>()) {}
+    : options_(checked(options)), tools_(std::make_unique<Tools>()) {}
 PlaceRecognition::PlaceRecognition(PlaceRecognition&&) noexcept = default;
 PlaceRecognition::~PlaceRecognition() = default;
 
@@ -59,12 +59,12 @@ std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& featu
   report.id = next_id_;
   Stopwatch stopwatch;
   const StereoFeatures kept = thinOut(features, options_.max_features);
-  const PlaceSignature signature = parts_->index.signature(kept);
+  const PlaceSignature signature = tools_->index.signature(kept);
   addKeyframe(kept, next_id_++);
   const Place& here = places_.at(report.id);
   report.candidates =
-      parts_->index.find(signature, options_.candidates, [&](int id) { return isCandidate(places_.at(id), here); });
-  if (!options_.localisation_only) parts_->index.add(report.id, signature);
+      tools_->index.find(signature, options_.candidates, [&](int id) { return isCandidate(places_.at(id), here); });
+  if (!options_.localisation_only) tools_->index.add(report.id, signature);
   report.find_time = stopwatch.lap();
   recognise(here, report);
   report.verify_time = stopwatch.lap();
@@ -87,9 +87,9 @@ bool PlaceRecognition::isCandidate(const Place& place, const Place& here) const 
 /// Removes the oldest places beyond max_places. With localisation_only, only the newest key frames of this session are
 /// kept, for the path between two loops.
 void PlaceRecognition::forgetOldest() {
-  constexpr int kWay = 20;
+  constexpr int kKept = 20;
   if (options_.localisation_only) {
-    while (static_cast<int>(std::distance(places_.lower_bound(restored_), places_.end())) > kWay)
+    while (static_cast<int>(std::distance(places_.lower_bound(restored_), places_.end())) > kKept)
       forget(places_.lower_bound(restored_)->first);
     return;
   }
@@ -97,7 +97,7 @@ void PlaceRecognition::forgetOldest() {
 }
 
 void PlaceRecognition::forget(int id) {
-  parts_->index.remove(id);
+  tools_->index.remove(id);
   graph_.remove(id);
   places_.erase(id);
 }
@@ -144,7 +144,7 @@ void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
 void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
   report.reason = "no place looks similar";
   for (const PlaceCandidate& candidate : report.candidates) {
-    report.match = parts_->verifier.verify(places_.at(candidate.place).features, here.features);
+    report.match = tools_->verifier.verify(places_.at(candidate.place).features, here.features);
     report.reason = report.match.reason;
     if (!report.match.same) continue;
     const GraphEdge loop{candidate.place, here.id, GraphEdge::Kind::kLoop, report.match.T_place_camera,
@@ -154,7 +154,7 @@ void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
       continue;
     }
     report.same = candidate.place;
-    const std::vector<GraphEdge> loops = parts_->agreement.confirm(graph_, loop);
+    const std::vector<GraphEdge> loops = tools_->agreement.confirm(graph_, loop);
     for (const GraphEdge& trusted : loops) graph_.close(trusted);
     report.loop = !loops.empty();
     if (report.loop) {
@@ -200,7 +200,7 @@ Eigen::Isometry3d PlaceRecognition::T_map_odom() const {
 }
 
 PlaceSignature PlaceRecognition::signature(int place) const {
-  return parts_->index.signature(places_.at(place).features);
+  return tools_->index.signature(places_.at(place).features);
 }
 
 std::size_t PlaceRecognition::bytes() const {
@@ -212,11 +212,11 @@ std::size_t PlaceRecognition::bytes() const {
 }
 
 std::vector<PlaceCandidate> PlaceRecognition::find(const PlaceSignature& signature) const {
-  return parts_->index.find(signature, options_.candidates, [](int) { return true; });
+  return tools_->index.find(signature, options_.candidates, [](int) { return true; });
 }
 
 PlaceMatch PlaceRecognition::verify(int place, const StereoFeatures& features) const {
-  return parts_->verifier.verify(places_.at(place).features, thinOut(features, options_.max_features));
+  return tools_->verifier.verify(places_.at(place).features, thinOut(features, options_.max_features));
 }
 
 void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph) {
@@ -247,7 +247,7 @@ void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph
     throw std::invalid_argument(text(0, "places ", first, " and ", last, " cannot be of one map"));
   segment_ = segment;
   places_ = std::move(restored);
-  parts_->index = std::move(index);
+  tools_->index = std::move(index);
   graph_ = graph;
   next_id_ = restored_ = places_.rbegin()->first + 1;
   if (options_.localisation_only) graph_.hold(restored_ - 1);

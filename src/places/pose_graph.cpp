@@ -30,7 +30,8 @@ int otherEnd(const GraphEdge& edge, int id) {
   return edge.from == id ? edge.to : edge.from;
 }
 
-struct Way {
+/// Shortest path to a node: its length, m, and its last edge.
+struct PathTo {
   double length = std::numeric_limits<double>::infinity();
   const GraphEdge* last = nullptr;
 };
@@ -38,25 +39,25 @@ struct Way {
 /// Shortest paths from a node without breaks (Dijkstra's algorithm). Ends at the first node for which done(id, length)
 /// is true: all paths that are not longer are final.
 template <class Done>
-std::map<int, Way> shortestWays(const std::vector<GraphEdge>& edges, int from, const Done& done) {
+std::map<int, PathTo> shortestPaths(const std::vector<GraphEdge>& edges, int from, const Done& done) {
   EdgesOf edges_of = edgesOf(edges);
-  std::map<int, Way> ways;
+  std::map<int, PathTo> paths;
   using Open = std::pair<double, int>;
   std::priority_queue<Open, std::vector<Open>, std::greater<Open>> open;
-  ways[from].length = 0.0;
+  paths[from].length = 0.0;
   open.push({0.0, from});
   while (!open.empty() && !done(open.top().second, open.top().first)) {
     const auto [length, id] = open.top();
     open.pop();
-    if (length > ways[id].length) continue;
+    if (length > paths[id].length) continue;
     for (const GraphEdge* edge : edges_of[id]) {
-      Way& next = ways[otherEnd(*edge, id)];
+      PathTo& next = paths[otherEnd(*edge, id)];
       if (length + edge->length >= next.length) continue;
       next = {length + edge->length, edge};
       open.push({next.length, otherEnd(*edge, id)});
     }
   }
-  return ways;
+  return paths;
 }
 
 }  // namespace
@@ -90,6 +91,7 @@ void PoseGraph::close(const GraphEdge& edge) {
   constexpr double kAny = std::numeric_limits<double>::infinity();
   std::set<int> moved = near(edge.to, kAny);
   if (moved.count(edge.from) == 0) {
+    // The loop joins two parts of the graph: that without the first node moves to the other one.
     Eigen::Isometry3d T_moved = T_map_from * edge.T_from_to * T_map_to.inverse();
     if (moved.count(nodes_.begin()->first) > 0) {
       moved = near(edge.from, kAny);
@@ -109,7 +111,8 @@ void PoseGraph::remove(int id) {
 }
 
 PoseGraph::Summary PoseGraph::optimise() {
-  constexpr double kMoreSlack = 3.2;
+  // If most loops contradict the odometry, its edges are given more of the largest drift.
+  constexpr double kMoreSlack = 3.2;  // half a power of ten
   Summary summary;
   if (loops() == 0) {
     summary.converged = true;
@@ -165,21 +168,21 @@ bool PoseGraph::adopt(const PoseGraph& optimised) {
 
 std::set<int> PoseGraph::near(int id, double longest) const {
   std::set<int> found;
-  for (const auto& [node, way] : shortestWays(edges_, id, [&](int, double length) { return length > longest; }))
-    if (way.length <= longest) found.insert(node);
+  for (const auto& [node, path] : shortestPaths(edges_, id, [&](int, double length) { return length > longest; }))
+    if (path.length <= longest) found.insert(node);
   return found;
 }
 
 GraphPath PoseGraph::path(int from, int to) const {
-  const std::map<int, Way> ways = shortestWays(edges_, from, [&](int id, double) { return id == to; });
+  const std::map<int, PathTo> paths = shortestPaths(edges_, from, [&](int id, double) { return id == to; });
   GraphPath path;
-  path.known = ways.count(to) > 0;
+  path.known = paths.count(to) > 0;
   if (!path.known) return path;
-  path.length = ways.at(to).length;
+  path.length = paths.at(to).length;
   // From the end backwards: the covariance of the relative pose from a node to the end.
   Eigen::Isometry3d T_node_end = Eigen::Isometry3d::Identity();
   for (int id = to; id != from;) {
-    const GraphEdge& edge = *ways.at(id).last;
+    const GraphEdge& edge = *paths.at(id).last;
     const bool forward = edge.to == id;
     const Matrix6d step = forward ? edge.covariance : carried(edge.T_from_to, edge.covariance);  // of the inverse
     path.covariance += carried(T_node_end.inverse(), step);

@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t kAround = 4;  // pairs before and after one, whose mean rates give the slow rate there
 
-/// A feature's position (u_left, v_left) against the map, px: its derivative by the pose, by a readout of 1 s at the
-/// rates as they are, and at slow ones.
+/// How a feature's position (u_left, v_left), px, depends on the pose and on the readout: derivatives by the pose, by a
+/// readout (1/s) at the camera's rates of rotation, and at slow rates. The last one is the instrument.
 struct Shift {
   Eigen::Matrix<double, 8, 2> derivative;
   Eigen::Vector2d residual;
@@ -109,7 +109,7 @@ void RowReadout::measure() {
     }
     fit.head<7>() = square.topLeftCorner<7, 7>().ldlt().solve(by_residual.head<7>());
   }
-  // The instrument, which has slow rates, without what the pose explains of it.
+  // Product of instrument and shift, and of instrument and residual, without what the pose explains of them.
   const Vector6d explained = square.topLeftCorner<6, 6>().ldlt().solve(square.topRightCorner<6, 1>());
   const double information = square(6, 7) - explained.dot(square.block<6, 1>(0, 6));
   const double product = by_residual[7] - explained.dot(by_residual.head<6>());

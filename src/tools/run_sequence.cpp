@@ -228,8 +228,7 @@ void refuseOutputsThatReplace(const Arguments& arguments) {
       throw std::runtime_error("'" + output + "' has true poses, or is another output: give another name");
 }
 
-int run(const Arguments& arguments) {
-  refuseOutputsThatReplace(arguments);
+void refuseContradictions(const Arguments& arguments) {
   const bool has_page = !arguments.page.empty();
   const bool is_of_places = !(arguments.before.empty() && arguments.odometry.empty() && arguments.keyframes.empty());
   if (is_of_places && !arguments.places) throw std::runtime_error("--before, --odometry and --keyframes need --places");
@@ -241,6 +240,34 @@ int run(const Arguments& arguments) {
   if (arguments.inputs.size() > 1 && !arguments.join)
     throw std::runtime_error(
         "several recordings are run_many's; --join where they are parts of one drive (see --help)");
+}
+
+void prepareFolders(const Arguments& arguments) {
+  for (const std::string& folder : {arguments.pictures, arguments.output}) {
+    std::error_code error;
+    if (!folder.empty()) fs::create_directories(folder, error);
+    if (error) throw std::runtime_error("cannot create folder '" + folder + "': " + error.message());
+  }
+  if (!arguments.pictures.empty() && !fs::is_empty(arguments.pictures))
+    throw std::runtime_error("--pictures '" + arguments.pictures + "' is not empty: choose another folder");
+  if (!arguments.output.empty()) fs::remove(reportOf(arguments));  // of an earlier run
+}
+
+/// The files that are asked for, each by its name.
+void writeFiles(const OfflineRun& run, const PlaceRun* places, const Arguments& arguments) {
+  if (places)
+    writeKittiPoses(arguments.poses, places->poses());
+  else if (!arguments.poses.empty())
+    writePoses(arguments.poses, arguments.format, run);
+  if (!arguments.odometry.empty()) writePoses(arguments.odometry, arguments.format, run);
+  if (!arguments.timing.empty()) run.writeTiming(arguments.timing);
+  if (!arguments.states.empty()) run.writeStates(arguments.states);
+  if (!arguments.keyframes.empty()) places->writeKeyframes(arguments.keyframes);
+}
+
+int run(const Arguments& arguments) {
+  refuseOutputsThatReplace(arguments);
+  refuseContradictions(arguments);
   cv::setNumThreads(arguments.threads);
   const PipelineOptions options = readPipelineOptions(arguments.config, arguments.settings);
   StereoSource source = arguments.source;
@@ -256,14 +283,7 @@ int run(const Arguments& arguments) {
     way += drive.whole.distance();
     places->startSequence();
   }
-  for (const std::string& folder : {arguments.pictures, arguments.output}) {
-    std::error_code error;
-    if (!folder.empty()) fs::create_directories(folder, error);
-    if (error) throw std::runtime_error("cannot create folder '" + folder + "': " + error.message());
-  }
-  if (!arguments.pictures.empty() && !fs::is_empty(arguments.pictures))
-    throw std::runtime_error("--pictures '" + arguments.pictures + "' is not empty: choose another folder");
-  if (!arguments.output.empty()) fs::remove(reportOf(arguments));  // of an earlier run
+  prepareFolders(arguments);
   const auto recording = openRecording(arguments.inputs, source);
   Drive drive(options);
   std::optional<Seen> seen;
@@ -271,15 +291,7 @@ int run(const Arguments& arguments) {
     seen.emplace(Seen{CameraCheck(options), DrivePictures(std::min(arguments.frames, recording->size()))});
   follow(*recording, arguments, drive, places ? &*places : nullptr, seen ? &*seen : nullptr);
   const OfflineRun& run = drive.whole;
-  if (places)
-    writeKittiPoses(arguments.poses, places->poses());
-  else if (!arguments.poses.empty())
-    writePoses(arguments.poses, arguments.format, run);
-  if (!arguments.odometry.empty()) writePoses(arguments.odometry, arguments.format, run);
-  if (!arguments.timing.empty()) run.writeTiming(arguments.timing);
-  if (!arguments.states.empty()) run.writeStates(arguments.states);
-  if (!arguments.keyframes.empty()) places->writeKeyframes(arguments.keyframes);
-
+  writeFiles(run, places ? &*places : nullptr, arguments);
   std::cout << std::fixed << std::setprecision(1);
   places ? printSummary(run, *places, way + run.distance()) : printSummary(run, options);
   if (places && !arguments.truth.empty()) printErrors(places->errors(wholeTruth(*recording, run, arguments.truth)));

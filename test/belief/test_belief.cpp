@@ -42,7 +42,7 @@ class Weighed : public testing::Test {
     found.motion.T_current_reference.translation().z() = -2.0;
     found.agreement.lasting_matches = 100;
     found.agreement.lasting_inliers = agreeing;
-    return doubt.weigh(scene_, found, evidence);
+    return doubt.update(scene_, found, evidence);
   }
 
   LocalMap map_{{}};
@@ -55,7 +55,7 @@ TEST_F(Weighed, WhereNothingIsExpectedTheMotionIsAsUncertainAsItIsLong) {
   found.motion.T_current_reference.translation().z() = -2.0;
   Doubt doubt = after(kCertain, "a knock");
   doubt.raise({{0.0, "less", true}});
-  const Belief belief = doubt.weigh(scene_, found, {});
+  const Belief belief = doubt.update(scene_, found, {});
   EXPECT_EQ(belief.reason.rfind("a moment ago a knock", 0), 0u) << belief.reason;
   EXPECT_NEAR(belief.probability, 0.001, 1e-4);
   EXPECT_NEAR(std::sqrt(belief.moment(2, 2)), 2.0, 0.1);
@@ -83,7 +83,7 @@ TEST_F(Weighed, AMotionOfNoProbabilityLeavesFiniteNumbers) {
   MotionHypothesis found;
   found.probability = 0.0;
   Doubt doubt;
-  const Belief belief = doubt.weigh(scene_, found, {});
+  const Belief belief = doubt.update(scene_, found, {});
   EXPECT_TRUE(belief.moment.allFinite() && belief.pose_moment.allFinite());
   EXPECT_LT(belief.probability, 0.01);
 }

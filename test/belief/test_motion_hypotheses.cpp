@@ -196,23 +196,23 @@ TEST_F(Competition, OfFailuresTheLargestIsReturned) {
 TEST_F(Competition, AnImprobableMotionMisleadsUnlessLastingPointsConfirmIt) {
   scene_.prior = {{moved(2.0), 0.01 * Matrix6d::Identity()}};
   add(100, 0.0, 1);
-  EXPECT_GT(logOddsMisled(hypothesis(0.0)), 0.0);
+  EXPECT_GT(logOddsWrong(hypothesis(0.0)), 0.0);
   view_->seen.assign(100, 4);
-  EXPECT_LT(logOddsMisled(hypothesis(0.0)), logOdds(0.05));
+  EXPECT_LT(logOddsWrong(hypothesis(0.0)), logOdds(0.05));
   scene_.prior.clear();
-  EXPECT_LT(logOddsMisled(hypothesis(0.0)), kUnsuspected);
+  EXPECT_LT(logOddsWrong(hypothesis(0.0)), kUnsuspected);
 }
 
 TEST_F(Competition, LastingPointsThatDisagreeAreMoreSuspiciousThanUsual) {
   add(25, 0.0, 4), add(75, 0.5, 4);
-  EXPECT_GT(logOddsMisled(hypothesis(0.0)), kUnsuspected + 2.0);
+  EXPECT_GT(logOddsWrong(hypothesis(0.0)), kUnsuspected + 2.0);
 }
 
 TEST_F(Competition, RejectedRowsAreNoInliers) {
   add(10, 0.0, 4), add(10, 0.0, 1);
   MotionHypothesis found = hypothesis(0.0);
   EXPECT_EQ(found.agreement.lasting_matches, 10);
-  found.reject({3, 12});
+  found.countInliers({3, 12});
   EXPECT_EQ(found.agreement.inliers, 18);
   EXPECT_EQ(found.agreement.lasting_inliers, 9);
   EXPECT_EQ(found.inlierFeatures({3, 12}).size(), 18u);

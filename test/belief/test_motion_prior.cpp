@@ -148,12 +148,13 @@ TEST(MotionPrior, InnovationsAreSquaredInStandardDeviations) {
 
 TEST(MotionPrior, AnUnseenMotionIsBoundedByTheSpeedAndByATurn) {
   MotionPrior prior = moving({});
-  const double second = std::sqrt(prior.unseen(1.0)(0, 0));
+  const double second = std::sqrt(prior.outageCovariance(1.0)(0, 0));
   EXPECT_GT(second, 3.0);
   EXPECT_LT(second, 3.5);
-  EXPECT_LE(std::sqrt(prior.unseen(1e5)(0, 0)), 70.0 * 1e5);
-  EXPECT_LE(std::sqrt(prior.unseen(1e5)(3, 3)), M_PI);
-  for (double t = 0.1; t < 100.0; t *= 2.0) EXPECT_GT(prior.unseen(2.0 * t)(0, 0), prior.unseen(t)(0, 0));
+  EXPECT_LE(std::sqrt(prior.outageCovariance(1e5)(0, 0)), 70.0 * 1e5);
+  EXPECT_LE(std::sqrt(prior.outageCovariance(1e5)(3, 3)), M_PI);
+  for (double t = 0.1; t < 100.0; t *= 2.0)
+    EXPECT_GT(prior.outageCovariance(2.0 * t)(0, 0), prior.outageCovariance(t)(0, 0));
 }
 
 TEST(MotionPrior, NoiseAndStampsMayExceedTheLargestSpeed) {

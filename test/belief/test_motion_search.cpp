@@ -357,8 +357,8 @@ TEST_F(CoveredView, WhatNoCameraDoesIsNotTheCamerasHoweverManyAgree) {
 TEST_F(CoveredView, WhereNothingElseIsSeenTheMotionIsLikelyNotTheCameras) {
   begin(see(0.0, false));
   const StereoFeatures features = see(0.0, false);
-  EXPECT_GT(logOddsMisled(find(features, kStep, true)), 0.0);
-  EXPECT_LT(logOddsMisled(find(features, 0.0, true)), kLargestDoubt);
+  EXPECT_GT(logOddsWrong(find(features, kStep, true)), 0.0);
+  EXPECT_LT(logOddsWrong(find(features, 0.0, true)), kLargestDoubt);
 }
 
 TEST_F(MotionSearchTest, FailsWithAReason) {

@@ -47,20 +47,20 @@ TEST(PoseCovariance, BeginsAtZero) {
 
 TEST(PoseCovariance, AddsMotionsThatAreKnownByThemselves) {
   PoseCovariance covariance;
-  covariance.advance(forward(), diagonal(0.5, 0.25));
+  covariance.predict(forward(), diagonal(0.5, 0.25));
   expectEqual(covariance.value(), diagonal(0.5, 0.25));
-  covariance.advance(forward(), diagonal(0.125, 0.0));
+  covariance.predict(forward(), diagonal(0.125, 0.0));
   expectEqual(covariance.value(), afterForward(0.5, 0.25) + diagonal(0.125, 0.0));
 }
 
 TEST(PoseCovariance, DoesNotGrowBetweenPairsMeasuredFromOneKeyframe) {
   PoseCovariance covariance;
-  expectEqual(covariance.measure(kStill, diagonal(0.5, 0.25)), diagonal(0.5, 0.25));
+  expectEqual(covariance.update(kStill, diagonal(0.5, 0.25)), diagonal(0.5, 0.25));
   expectEqual(covariance.value(), diagonal(0.5, 0.25));
-  expectEqual(covariance.measure(kStill, diagonal(0.75, 0.25)), diagonal(0.75, 0.25));
+  expectEqual(covariance.update(kStill, diagonal(0.75, 0.25)), diagonal(0.75, 0.25));
   expectEqual(covariance.value(), diagonal(0.75, 0.25));
   // A better pose does not take back what was reported.
-  covariance.measure(kStill, diagonal(0.125, 0.125));
+  covariance.update(kStill, diagonal(0.125, 0.125));
   expectEqual(covariance.value(), diagonal(0.75, 0.25));
 }
 
@@ -75,8 +75,8 @@ TEST(PoseCovariance, TheErrorOfTheKeyframeCancelsInTheMotion) {
     motion_square += (now - before) * (now - before) / kTrials, pose_square += now * now / kTrials;
   }
   PoseCovariance covariance;
-  covariance.measure(kStill, diagonal(pose_square, 0.0));
-  const Matrix6d motion = covariance.measure(kStill, diagonal(pose_square, 0.0));
+  covariance.update(kStill, diagonal(pose_square, 0.0));
+  const Matrix6d motion = covariance.update(kStill, diagonal(pose_square, 0.0));
   EXPECT_NEAR(motion(0, 0), motion_square, 0.05 * motion_square);
 }
 
@@ -84,15 +84,15 @@ TEST(PoseCovariance, AMotionIsThatOfTheLastTwoPosesToEachOther) {
   // Along a line: the key frame errs by `common`, a pair by its own error against it. A weak pair, then a good one.
   constexpr double kCommon = 1.0, kWeak = 9.0, kGood = 1.0;
   PoseCovariance covariance;
-  covariance.measure(kStill, diagonal(kCommon + kWeak, 0.25));
-  Matrix6d motion = covariance.measure(kStill, diagonal(kCommon + kGood, 0.25));
+  covariance.update(kStill, diagonal(kCommon + kWeak, 0.25));
+  Matrix6d motion = covariance.update(kStill, diagonal(kCommon + kGood, 0.25));
   EXPECT_NEAR(motion(0, 0), kWeak + kGood, 1e-9) << "both pairs' own errors, not the key frame's";
-  motion = covariance.measure(kStill, diagonal(kCommon + kGood, 0.25));
+  motion = covariance.update(kStill, diagonal(kCommon + kGood, 0.25));
   EXPECT_NEAR(motion(0, 0), kGood + kGood, 1e-9) << "the weak pair has no part in it";
   // Where the pair before is the key frame, its error is what the new one is measured against.
-  covariance.measure(kStill, diagonal(kCommon + kWeak, 0.25));
+  covariance.update(kStill, diagonal(kCommon + kWeak, 0.25));
   covariance.markKeyframe();
-  motion = covariance.measure(kStill, diagonal(kCommon + kGood, 0.25));
+  motion = covariance.update(kStill, diagonal(kCommon + kGood, 0.25));
   EXPECT_NEAR(motion(0, 0), kCommon + kGood, 1e-9);
 }
 
@@ -100,21 +100,21 @@ TEST(PoseCovariance, AMotionIsAsUncertainInEachDirectionAsTheWorseOfTheTwoPoses)
   PoseCovariance covariance;
   Matrix6d sideways = diagonal(0.1, 0.01), ahead = sideways;
   sideways(0, 0) = 0.9, ahead(2, 2) = 0.9;
-  covariance.measure(kStill, sideways);
+  covariance.update(kStill, sideways);
   Matrix6d both = sideways;
   both(2, 2) = 0.9;
-  expectEqual(covariance.measure(kStill, ahead), both);
+  expectEqual(covariance.update(kStill, ahead), both);
 }
 
 TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   PoseCovariance covariance;
-  covariance.measure(kStill, diagonal(0.0001, 0.0001));
+  covariance.update(kStill, diagonal(0.0001, 0.0001));
   Vector6d correction = Vector6d::Zero();
   correction[0] = 0.015;
-  covariance.cover(correction);
+  covariance.coverCorrection(correction);
   expectEqual(covariance.value(), diagonal(0.0001, 0.0001));  // one and a half standard deviations are expected
   correction[0] = 0.02;
-  covariance.cover(correction);
+  covariance.coverCorrection(correction);
   // All of the correction along itself, and 3 % of it in each direction.
   Matrix6d added = Matrix6d::Zero();
   const auto add = [&](double square) {
@@ -124,26 +124,26 @@ TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   add(0.0004);
   expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
   correction[0] = 0.5;
-  covariance.cover(correction);
+  covariance.coverCorrection(correction);
   add(0.25);
   expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
-  covariance.cover(correction);
+  covariance.coverCorrection(correction);
   expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
   // What is measured from the same key frame later has that error, too.
-  covariance.measure(kStill, diagonal(1.0, 1.0));
+  covariance.update(kStill, diagonal(1.0, 1.0));
   expectEqual(covariance.value(), diagonal(1.0, 1.0) + added);
 }
 
 TEST(PoseCovariance, GrowsFromKeyframeToKeyframe) {
   PoseCovariance covariance;
-  covariance.measure(forward(), diagonal(0.5, 0.25));
+  covariance.update(forward(), diagonal(0.5, 0.25));
   covariance.markKeyframe();
   const double translation = 0.5, rotation = 0.25;
   expectEqual(covariance.value(), diagonal(translation, rotation));
-  covariance.measure(forward(), diagonal(0.125, 0.0));
+  covariance.update(forward(), diagonal(0.125, 0.0));
   expectEqual(covariance.value(), afterForward(translation, rotation) + diagonal(0.125, 0.0));
   // Still from that key frame, which is now two steps behind.
-  covariance.measure(forward(), diagonal(0.25, 0.0));
+  covariance.update(forward(), diagonal(0.25, 0.0));
   Matrix6d expected = diagonal(translation + 0.25, rotation);
   for (const int axis : {0, 1}) expected(axis, axis) += 4.0 * kForward * kForward * rotation;
   expected(0, 4) = expected(4, 0) = 2.0 * kForward * rotation;
@@ -154,12 +154,12 @@ TEST(PoseCovariance, GrowsFromKeyframeToKeyframe) {
 TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
   for (const bool from_keyframe : {false, true}) {
     PoseCovariance covariance;
-    covariance.measure(forward(), diagonal(0.5, 0.25));
+    covariance.update(forward(), diagonal(0.5, 0.25));
     if (from_keyframe) covariance.markKeyframe();
-    covariance.advance(forward(), diagonal(8.0, 2.0));
+    covariance.predict(forward(), diagonal(8.0, 2.0));
     const Matrix6d predicted = afterForward(0.5, 0.25) + diagonal(8.0, 2.0);
     expectEqual(covariance.value(), predicted);
-    const Matrix6d motion = covariance.measure(forward(), diagonal(0.75, 0.25)) - afterForward(8.0, 2.0);
+    const Matrix6d motion = covariance.update(forward(), diagonal(0.75, 0.25)) - afterForward(8.0, 2.0);
     if (from_keyframe) {
       expectEqual(motion, diagonal(0.75, 0.25));
     } else {
@@ -168,7 +168,7 @@ TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
       expectCovers(motion, afterForward(0.5, 0.25, 2.0 * kForward));
     }
     // Only once.
-    const Matrix6d next = covariance.measure(forward(), diagonal(0.75, 0.25));
+    const Matrix6d next = covariance.update(forward(), diagonal(0.75, 0.25));
     expectCovers(next, afterForward(0.75, 0.25));
     EXPECT_LT(next.trace(), 2.0 * afterForward(0.75, 0.25).trace());
   }
@@ -176,50 +176,50 @@ TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
 
 TEST(PoseCovariance, APredictionEndsWithTheNextMeasuredPose) {
   PoseCovariance covariance;
-  covariance.measure(kStill, diagonal(0.5, 0.25));
-  for (int i = 0; i < 1000; ++i) covariance.advance(kStill, diagonal(8.0, 2.0));
-  covariance.measure(kStill, diagonal(0.5, 0.25));
+  covariance.update(kStill, diagonal(0.5, 0.25));
+  for (int i = 0; i < 1000; ++i) covariance.predict(kStill, diagonal(8.0, 2.0));
+  covariance.update(kStill, diagonal(0.5, 0.25));
   expectEqual(covariance.value(), diagonal(0.5, 0.25));
 }
 
 TEST(PoseCovariance, AKeyframeThatWasDoubtedLeavesNoDoubtToThePosesMeasuredInItsMap) {
   PoseCovariance covariance;
-  covariance.measure(kStill, diagonal(0.5, 0.25));
-  covariance.doubt(diagonal(8.0, 2.0), diagonal(8.0, 2.0));
+  covariance.update(kStill, diagonal(0.5, 0.25));
+  covariance.addDoubt(diagonal(8.0, 2.0), diagonal(8.0, 2.0));
   covariance.markKeyframe();
   expectEqual(covariance.value(), diagonal(8.5, 2.25));
-  const Matrix6d motion = covariance.measure(kStill, diagonal(0.125, 0.125));
+  const Matrix6d motion = covariance.update(kStill, diagonal(0.125, 0.125));
   expectEqual(motion, diagonal(8.125, 2.125));
   expectEqual(covariance.value(), diagonal(0.625, 0.375));
 }
 
 TEST(PoseCovariance, AnAssumedPoseIsTheKeyFrameOfANewDrive) {
   PoseCovariance covariance;
-  covariance.measure(forward(), diagonal(0.5, 0.25));
-  covariance.doubt(diagonal(1.0, 1.0), diagonal(1.0, 1.0));
-  covariance.assume(covariance.value() + diagonal(100.0, 0.25));
+  covariance.update(forward(), diagonal(0.5, 0.25));
+  covariance.addDoubt(diagonal(1.0, 1.0), diagonal(1.0, 1.0));
+  covariance.reset(covariance.value() + diagonal(100.0, 0.25));
   expectEqual(covariance.value(), diagonal(101.5, 1.5));
   // Neither the measurement nor the doubt before the gap has a part in the first motion after it.
-  expectEqual(covariance.measure(forward(), diagonal(0.125, 0.0)), diagonal(0.125, 0.0));
+  expectEqual(covariance.update(forward(), diagonal(0.125, 0.0)), diagonal(0.125, 0.0));
   expectEqual(covariance.value(), afterForward(101.5, 1.5) + diagonal(0.125, 0.0));
 }
 
 TEST(PoseCovariance, ADoubtedPoseIsReportedSoUntilTheNextOneIsMeasured) {
   PoseCovariance covariance;
-  covariance.measure(kStill, diagonal(0.5, 0.25));
-  covariance.doubt(diagonal(8.0, 2.0), diagonal(16.0, 4.0));
+  covariance.update(kStill, diagonal(0.5, 0.25));
+  covariance.addDoubt(diagonal(8.0, 2.0), diagonal(16.0, 4.0));
   expectEqual(covariance.value(), diagonal(16.5, 4.25));
-  expectEqual(covariance.measure(kStill, diagonal(0.5, 0.25)), diagonal(8.5, 2.25));
+  expectEqual(covariance.update(kStill, diagonal(0.5, 0.25)), diagonal(8.5, 2.25));
   expectEqual(covariance.value(), diagonal(0.5, 0.25));
 }
 
 TEST(PoseCovariance, RotationDoesNotFallWhereTranslationGrows) {
   PoseCovariance covariance;
-  covariance.measure(kStill, diagonal(0.5, 0.25));
-  covariance.measure(kStill, diagonal(0.5, 2.25));
-  covariance.measure(kStill, diagonal(9.0, 0.5));
+  covariance.update(kStill, diagonal(0.5, 0.25));
+  covariance.update(kStill, diagonal(0.5, 2.25));
+  covariance.update(kStill, diagonal(9.0, 0.5));
   expectEqual(covariance.value(), diagonal(9.0, 2.25));
-  covariance.measure(kStill, diagonal(4.0, 3.0));
+  covariance.update(kStill, diagonal(4.0, 3.0));
   expectEqual(covariance.value(), diagonal(9.0, 3.0));
 }
 
@@ -227,9 +227,9 @@ TEST(PoseCovariance, StaysSymmetricAndPositive) {
   PoseCovariance covariance;
   const Eigen::Isometry3d step = expSE3((Vector6d() << 0.1, -0.05, 1.0, 0.02, -0.3, 0.1).finished());
   for (int i = 0; i < 1000; ++i) {
-    const Matrix6d motion = covariance.measure(step, diagonal(1e-4, 1e-6) * (1 + i % 7));
+    const Matrix6d motion = covariance.update(step, diagonal(1e-4, 1e-6) * (1 + i % 7));
     if (i % 3 == 0) covariance.markKeyframe();
-    if (i % 11 == 0) covariance.doubt(diagonal(1e-2, 1e-4), diagonal(2e-2, 1e-4));
+    if (i % 11 == 0) covariance.addDoubt(diagonal(1e-2, 1e-4), diagonal(2e-2, 1e-4));
     for (const Matrix6d& matrix : {motion, covariance.value()}) {
       EXPECT_EQ(matrix, matrix.transpose());
       EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(matrix).eigenvalues().minCoeff(), 0.0) << i;
@@ -244,8 +244,8 @@ PoseCovariance tenSteps(const RigEstimate::Vector& compensated) {
   by_rig.row(2) << 0.02, 0.005, 0.4, 3.0;  // m/px, m/px, m/rad, m/s
   for (int step = 0; step < 10; ++step) {
     for (const int pair : {0, 1}) {  // of which the second is the key frame
-      covariance.measure(pair == 0 ? forward() : kStill, diagonal(1e-4, 0.0));
-      covariance.expose(by_rig, RigEstimate(), compensated);
+      covariance.update(pair == 0 ? forward() : kStill, diagonal(1e-4, 0.0));
+      covariance.updateExposure(by_rig, RigEstimate(), compensated);
     }
     covariance.markKeyframe();
   }
@@ -277,8 +277,8 @@ TEST(PoseCovariance, TheWayBackUndoesTheRigsError) {
   RigEstimate::MotionJacobian by_rig = RigEstimate::MotionJacobian::Zero();
   by_rig.row(2) << -0.02, -0.005, -0.4, -3.0;
   for (int step = 0; step < 10; ++step) {
-    covariance.measure(forward().inverse(), diagonal(1e-4, 0.0));
-    covariance.expose(by_rig, RigEstimate(), RigEstimate::Vector::Zero());
+    covariance.update(forward().inverse(), diagonal(1e-4, 0.0));
+    covariance.updateExposure(by_rig, RigEstimate(), RigEstimate::Vector::Zero());
     covariance.markKeyframe();
   }
   EXPECT_LT(covariance.byRig(known).norm(), 1e-20);
@@ -291,8 +291,8 @@ TEST(PoseCovariance, AMotionHasItsPartOfTheRigsErrorAndAMapThatBeginsKeepsThePos
   RigEstimate::MotionJacobian by_rig = RigEstimate::MotionJacobian::Zero();
   by_rig(2, 0) = 0.02;  // m/px
   const auto step = [&](double pixels) {
-    covariance.measure(forward(), diagonal(1e-4, 0.0));
-    return std::sqrt(covariance.expose(pixels * by_rig, known, RigEstimate::Vector::Zero())(2, 2));
+    covariance.update(forward(), diagonal(1e-4, 0.0));
+    return std::sqrt(covariance.updateExposure(pixels * by_rig, known, RigEstimate::Vector::Zero())(2, 2));
   };
   EXPECT_NEAR(step(1.0), 0.02 * 0.3, 1e-12);
   EXPECT_NEAR(step(3.0), 2.0 * 0.02 * 0.3, 1e-12) << "since the last pose, not since the key frame";
@@ -328,8 +328,8 @@ TEST(PoseCovariance, IsThatOfOneGaussianOfPoseAndRig) {
     const Matrix6d mixed = by_rig * cross.transpose();
     pose += noise + mixed + mixed.transpose() + by_rig * known.covariance * by_rig.transpose();
     cross += by_rig * known.covariance;
-    covariance.measure(forward(), noise);
-    covariance.expose(by_rig, known, RigEstimate::Vector::Zero());
+    covariance.update(forward(), noise);
+    covariance.updateExposure(by_rig, known, RigEstimate::Vector::Zero());
     covariance.markKeyframe();
     EXPECT_LT((covariance.value() + covariance.byRig(known) - pose).norm(), 1e-9 * pose.norm()) << pair;
   }

@@ -729,7 +729,7 @@ TEST(LocalMap, APoseErrsByWhatItsCovarianceSaysAfterManyKeyframesOfTheSamePoints
       if (pair == 0) continue;
       const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
       ASSERT_TRUE(adjustment.success);
-      covariance.measure(before * map.newestPose().inverse(), adjustment.since_keyframe, adjustment.growth);
+      covariance.update(before * map.newestPose().inverse(), adjustment.since_keyframe, adjustment.growth);
       covariance.markKeyframe();
     }
     const Vector6d error = logSE3(pose * map.newestPose().inverse());

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "../../src/rig/right_rotation.hpp"
+#include "../../src/rig/row_readout.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
@@ -1278,6 +1279,29 @@ TEST(VisualOdometry, ARollingShutterOfKnownReadoutIsAsGoodAsAGlobalOne) {
   EXPECT_LT(largest(positions(-kReadout, -kReadout)), 0.2 * unknown) << "read upwards";
   EXPECT_LT(known, 0.2 * unknown);
   EXPECT_LT(known, 0.02) << "m, of 1.6 m";
+}
+
+TEST(VisualOdometry, AnUnknownReadoutIsFoundAndCompensated) {
+  constexpr double kReadout = 0.025;
+  constexpr int kPairs = 120, kFound = 80;
+  const auto wander = [](double taken, double known, OdometryResult& last) {
+    VisualOdometryOptions options;
+    options.calibration.readout = known;
+    VisualOdometry odometry(options);
+    std::vector<Eigen::Vector3d> path;
+    for (int i = 0; i < kPairs; ++i) {
+      last = odometry.update(rolledPair(i, taken));
+      path.push_back(last.T_origin_camera.translation());
+    }
+    return (path.back() - path[kFound]).eval();
+  };
+  OdometryResult last;
+  const Eigen::Vector3d truth = wander(0.0, 0.0, last);
+  EXPECT_LT(std::abs(last.readout), RowReadout::kWarn) << "a global shutter has none";
+  const Eigen::Vector3d found = wander(kReadout, 0.0, last);
+  EXPECT_NEAR(last.readout, kReadout, 2.0 * last.readout_sigma);
+  EXPECT_LT(last.readout_sigma, RowReadout::kWarn);
+  EXPECT_LT((found - truth).norm(), 0.02) << "m, of 1.6 m";
 }
 
 TEST(VisualOdometry, NamesTheMapsLastKeyframe) {

@@ -242,7 +242,7 @@ TEST_F(RobotTransformsTest, ACycleIsNamed) {
 
 TEST_F(RobotTransformsTest, ATransformMayBeClaimedLater) {
   start();
-  transforms_->claim({"map", "odom"});
+  transforms_->setOwnFrames({"map", "odom"});
   send(tf_, {transform("site", "odom", ros::Time::now())});
   waitForMarker(tf_);
   expectOneWarning({ros::this_node::getName() + " publishes map -> odom"});

@@ -110,8 +110,8 @@ class PlaceRecognition {
   void forget(int id);
 
   PlaceRecognitionOptions options_;
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  struct Tools;
+  std::unique_ptr<Tools> tools_;
   PoseGraph graph_;
   std::map<int, Place> places_;
   std::optional<int> last_;        ///< key frame of this session

@@ -106,7 +106,7 @@ class PoseGraph {
 
   std::map<int, Eigen::Isometry3d> nodes_;  ///< T_map_node
   std::vector<GraphEdge> edges_;
-  int moved_parts_ = 0;
+  int moved_parts_ = 0;  ///< how often close() moved a part of the graph
   std::optional<int> held_;
   double turn_error_ = 0.0;
   double slack_ = 0.1;  ///< share of drift() in the standard deviation of odometry's edges

@@ -45,7 +45,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     stopThreads();
     if (observer_) observer_->stop();
     if (optimiser_) optimiser_->stop();
-    if (options_.save_at_shutdown && input_) saveByItself(true);
+    if (options_.save_at_shutdown && input_) autosave(true);
   }
 
  private:
@@ -97,7 +97,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     });
     if (options_.save_at_shutdown) {
       endAsBySigint();
-      saving_ = disk_nh.createWallTimer(kSavePeriod, [this](const ros::WallTimerEvent&) { saveByItself(false); });
+      saving_ = disk_nh.createWallTimer(kSavePeriod, [this](const ros::WallTimerEvent&) { autosave(false); });
     }
     observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(options_.queue_size),
                                                   [this](const Arrived& arrived) { observe(arrived); });
@@ -153,7 +153,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     diagnostics_->input().note(nanoseconds(pair.features->header.stamp));
     const std::string &map_frame = options_.map_frame_id, &odom_frame = pair.odometry->header.frame_id;
     ros_conversions::requireTwoFrames({"map_frame_id", map_frame}, {"the odometry's odom_frame_id", odom_frame});
-    if (options_.publish_tf) transforms_->claim({map_frame, cleanFrameId(odom_frame)});
+    if (options_.publish_tf) transforms_->setOwnFrames({map_frame, cleanFrameId(odom_frame)});
     if (!observer_->push({pair, generation_})) unused_->add(UnusedInput::kPushedOut);
   }
 
@@ -329,8 +329,9 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     return std::to_string(saved.places.size()) + " places in '" + path + "'";
   }
 
-  /// Writes places_file, each minute and at the end. At the end roslaunch grants 15 s, and rosconsole is gone.
-  void saveByItself(bool at_end) {
+  /// Saves the map in places_file without a call: each minute if it changed, and at the end. At the end roslaunch
+  /// grants 15 s, and rosconsole is gone.
+  void autosave(bool at_end) {
     const std::string path = inRosHome(options_.places_file);
     const auto say = [&](const std::string& what) {
       if (at_end)  // rosconsole ends while this runs
@@ -341,9 +342,10 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     std::unique_lock<std::mutex> lock(mutex_);
     const std::size_t places = session_->recognition().places().size();
     const auto kept = kept_.find(path);
-    const bool is_refused =
-        (kept == kept_.end() || places < kept->second) && std::filesystem::exists(path) && !options_.overwrite;
-    const bool is_due = changes_ != saved_changes_ && places > 0 && (at_end || ros::SteadyTime::now() >= next_save_);
+    const bool would_lose_places = kept == kept_.end() || places < kept->second;
+    const bool is_refused = would_lose_places && std::filesystem::exists(path) && !options_.overwrite;
+    const bool has_changed = changes_ != saved_changes_ && places > 0;
+    const bool is_due = has_changed && (at_end || ros::SteadyTime::now() >= next_save_);
     const std::size_t before = kept == kept_.end() ? 0 : kept->second;
     lock.unlock();
     if (!is_due) return;

@@ -175,8 +175,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
     std::vector<FeaturesFilter::Passed> passed =
         filter_.add(std::move(arrived), nanoseconds(message->header.stamp), nanoseconds(ros::Time::now()), new_stream);
-    // The first of two was held until the next one confirmed its stamp, perhaps by the image side, too. So it arrived
-    // late: it is dated back to the next one's arrival less the difference of their stamps.
+    // The first of two was held, here and perhaps by the image side, until the next one confirmed its stamp. So its
+    // arrival is too late: it becomes the next one's, less the difference of their stamps.
     if (passed.size() == 2) {
       Arrived &held = passed[0].item, &next = passed[1].item;
       const auto stamp = [](const Arrived& item) { return nanoseconds(item.message->header.stamp); };
@@ -305,21 +305,22 @@ class VisualOdometryNodelet : public RobotNodelet {
   /// If simulated time jumps back (a bag is played again), the odometry restarts. If stamps jump to either side, the
   /// camera's or system's clock was set: the interval of the pairs is that of their arrivals.
   void noteJumps(const FeaturesFilter::Passed& passed) {
-    constexpr std::int64_t kJump = 1000000000, kLeast = 1000000;  // ns: as the filter's; between two pairs
+    constexpr std::int64_t kJump = 1000000000, kLeast = 1000000;  // ns: as the filter's; least time between two pairs
     const std::int64_t stamp = nanoseconds(passed.item.message->header.stamp), now = passed.item.now;
     const auto before = std::exchange(last_arrival_, std::pair(stamp, now));
     const bool source_restarted = std::exchange(source_restarts_, passed.source_restarts) != passed.source_restarts;
     const bool clock_set = std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps;
     if (clock_set && ros::Time::isSimTime()) return restart("the clock jumped back");
     if (!before) return;
-    const std::int64_t step = stamp - before->first, passed_time = std::max(now - before->second, kLeast);
-    if (step > 0 && (step <= kJump || std::abs(step - passed_time) <= kJump)) return;
+    const std::int64_t by_stamps = stamp - before->first, by_arrivals = std::max(now - before->second, kLeast);
+    const bool is_regular = by_stamps > 0 && (by_stamps <= kJump || std::abs(by_stamps - by_arrivals) <= kJump);
+    if (is_regular) return;
     NODELET_WARN_STREAM((clock_set          ? "the system's clock was set back"
                          : source_restarted ? "the stamps of the features jumped back"
                                             : "the stamps of the features jumped ahead")
                         << " to " << passed.item.message->header.stamp << ": the odometry goes on, "
-                        << 1e-9 * static_cast<double>(passed_time) << " s after the pair before");
-    time_shift_ += passed_time - step;
+                        << 1e-9 * static_cast<double>(by_arrivals) << " s after the pair before");
+    time_shift_ += by_arrivals - by_stamps;
     processed_stamp_.reset();
     T_guess_processed_.reset();
   }
@@ -485,9 +486,9 @@ class VisualOdometryNodelet : public RobotNodelet {
   /// Takes roll and pitch of the first pose from the accelerometer, if the robot stands. That needs a second of
   /// measurements, for which it waits 2 s. Returns what is missing; empty when done.
   std::string level() {
-    constexpr double kPatience = 2.0;  // s of wall time
+    constexpr double kTimeout = 2.0;  // s of wall time
     const double now = steadyTime();
-    if (!levels_until_) levels_until_ = now + kPatience;
+    if (!levels_until_) levels_until_ = now + kTimeout;
     std::string problem;
     auto up = imu_->up(options_.base_frame_id, problem);
     constexpr double kSteep = 0.7;  // cosine of 45 degrees, between robots on slopes and another mounting (chosen)

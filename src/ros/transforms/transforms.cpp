@@ -128,7 +128,7 @@ std::optional<Eigen::Isometry3d> RobotTransforms::findMotion(const std::string& 
   return std::nullopt;
 }
 
-void RobotTransforms::claim(const ros_conversions::OdometryFrames& ours) {
+void RobotTransforms::setOwnFrames(const ros_conversions::OdometryFrames& ours) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ours_ = ours;
 }

@@ -38,7 +38,7 @@ class RobotTransforms {
                   Report warn);
 
   /// Sets `ours` later.
-  void claim(const ros_conversions::OdometryFrames& ours);
+  void setOwnFrames(const ros_conversions::OdometryFrames& ours);
 
   /// T_parent_child at a time, by default at the newest one known. None, with the `problem`, while TF has no such
   /// transform.
