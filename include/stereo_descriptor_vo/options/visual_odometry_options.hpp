@@ -138,7 +138,7 @@ struct CalibrationOptions {
              "time by which right images are known to be later than left ones; what it lacks is estimated");
     list.add("readout", readout, {-0.1, 0.1}, "s",
              "rolling shutters: the last row is taken so much later than the first (negative: earlier), the middle one "
-             "at the stamp");
+             "at the stamp; 0: estimated in turns");
   }
 };
 
