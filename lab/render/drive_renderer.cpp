@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "camera_pose.hpp"
 #include "random.hpp"
 
 namespace sdvo::render {
@@ -22,6 +23,16 @@ void Shutters::describe(OptionList& list) {
            "rolling shutters: the last row is taken that much later than the first");
 }
 
+void Mount::describe(OptionList& list) {
+  list.add("mount_x", x, {-2.0, 2.0}, "m", "the camera sits that much to the right of the trajectory's");
+  list.add("mount_z", z, {-2.0, 2.0}, "m", "the camera sits that much ahead of the trajectory's");
+  list.add("mount_yaw", yaw, {-180.0, 180.0}, "deg", "the camera looks that much to the right of the trajectory's");
+}
+
+Eigen::Isometry3d Mount::T_path_left() const {
+  return cameraPose(x, 0.0, z, yaw * M_PI / 180.0, 0.0, 0.0);
+}
+
 void RenderOptions::describe(OptionList& list) {
   list.add("samples", samples, {1, 16}, "rays", "rays per pixel: 1, 4 or 16");
   list.add("moving_share", moving_share, {0.0, 0.6}, "fraction", "share of pixels on moving cars, mean over the drive");
@@ -30,11 +41,17 @@ void RenderOptions::describe(OptionList& list) {
   effects.describe(list);
   misalignment.describe(list);
   shutters.describe(list);
+  mount.describe(list);
 }
 
 DriveRenderer::DriveRenderer(const DrivePath& path, Scenery scenery, const StereoCamera& camera,
                              const RenderOptions& options, int first, int count, int threads)
-    : path_(path), camera_(camera), options_(options), first_(first), device_(threads) {
+    : path_(path),
+      camera_(camera),
+      options_(options),
+      T_path_left_(options.mount.T_path_left()),
+      first_(first),
+      device_(threads) {
   camera_.check();
   checked(options_);
   const auto seed = static_cast<std::uint64_t>(options_.seed);
@@ -81,7 +98,7 @@ cv::Mat1f DriveRenderer::brightness(int side, double time, Worker& worker) const
 /// The rows of an image from `top` on.
 void DriveRenderer::addRows(int side, double time, Worker& worker, int top, cv::Mat1f rows) const {
   const auto rowsView = [&](double moment) {
-    View rows_view = view(side, path_.poseAt(moment));
+    View rows_view = view(side, leftPoseAt(moment));
     rows_view.cy -= top;
     rows_view.height = rows.rows;
     return rows_view;
@@ -128,8 +145,8 @@ StereoPair DriveRenderer::render(int frame, Worker& worker) const {
 
 Truth DriveRenderer::truth(int frame, Worker& worker) const {
   const double time = frame / path_.rate(), next_time = (frame + 1) / path_.rate();
-  const View now = view(0, path_.poseAt(time));
-  const Eigen::Isometry3d T_next_world = path_.poseAt(next_time).inverse();
+  const View now = view(0, leftPoseAt(time));
+  const Eigen::Isometry3d T_next_world = leftPoseAt(next_time).inverse();
   worker.place(traffic_.at(time));
   const Hits hits = renderer_->trace(now, worker);
 
@@ -179,7 +196,7 @@ double DriveRenderer::measureMovingShare(int first, int count) const {
   const int frames = std::min(count, kFrames);
   for (int i = 0; i < frames; ++i) {
     const double time = (first + static_cast<double>(i) * count / frames) / path_.rate();
-    small.T_world_camera = path_.poseAt(time);
+    small.T_world_camera = leftPoseAt(time);
     worker.place(traffic_.at(time));
     const Hits hits = renderer_->trace(small, worker);
     moving += cv::countNonZero(hits.car >= 0);

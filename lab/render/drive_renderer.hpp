@@ -27,6 +27,16 @@ struct Shutters {
   void describe(OptionList& list);
 };
 
+/// The left camera in the frame of the trajectory (x right, y down, z forward): another camera of the same robot.
+struct Mount {
+  double x = 0.0;    ///< m
+  double z = 0.0;    ///< m
+  double yaw = 0.0;  ///< to the right, degrees
+
+  void describe(OptionList& list);
+  Eigen::Isometry3d T_path_left() const;
+};
+
 struct RenderOptions {
   int samples = 4;              ///< rays per pixel
   double moving_share = 0.01;   ///< of the pixels that see a moving car, on average over the drive
@@ -35,6 +45,7 @@ struct RenderOptions {
   CameraEffects effects;
   Misalignment misalignment;
   Shutters shutters;
+  Mount mount;
 
   void describe(OptionList& list);
 };
@@ -78,6 +89,7 @@ class DriveRenderer {
   const World& world() const { return world_; }
 
  private:
+  Eigen::Isometry3d leftPoseAt(double time) const { return path_.poseAt(time) * T_path_left_; }
   View view(int side, const Eigen::Isometry3d& T_world_left) const;
   cv::Mat1f brightness(int side, double time, Worker& worker) const;
   void addRows(int side, double time, Worker& worker, int top, cv::Mat1f rows) const;
@@ -92,6 +104,7 @@ class DriveRenderer {
   DrivePath path_;
   StereoCamera camera_;
   RenderOptions options_;
+  Eigen::Isometry3d T_path_left_;
   int first_;
   Device device_;
   World world_;

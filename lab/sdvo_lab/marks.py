@@ -6,6 +6,7 @@ from .programs import ROOT
 
 ACCURACY = PERFORMANCE = SELF_CHECK = ROOT / "docs/precision.md"
 FAULTS = ROOT / "lab/docs/faults.md"
+RENDERED = ROOT / "lab/docs/rendered_drives.md"
 EXPERIMENTS = ROOT / "lab/docs/experiments.md"
 
 

@@ -179,13 +179,14 @@ int renderDrive(Request request) {
   std::vector<int> frames;
   std::vector<std::int64_t> stamps;
   sdvo::Trajectory poses;
-  const Eigen::Isometry3d T_first_world = path.pose(request.start).inverse();
+  const Eigen::Isometry3d T_path_left = request.options.mount.T_path_left();
+  const Eigen::Isometry3d T_first_world = (path.pose(request.start) * T_path_left).inverse();
   for (int i = 0; i < count; ++i) {
     const int frame = request.start + i;
     if (frame > request.start && renderer.isDropped(frame)) continue;
     frames.push_back(frame);
     stamps.push_back(std::llround(1e9 * i / request.rate));
-    poses.push_back(T_first_world * path.pose(frame));
+    poses.push_back(T_first_world * path.pose(frame) * T_path_left);
   }
   checkTruthFrames(static_cast<int>(frames.size()));  // some may have been dropped
 

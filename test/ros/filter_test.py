@@ -194,7 +194,7 @@ class FilterTest(PipelineCase):
         self.assertLess(np.abs(ekf.state[3:6]).max(), np.radians(1.0))
 
     def test_odometry_alone_with_the_reset_on_epoch(self):
-        self.assertEqual(len(self.recipes), 3)
+        self.assertEqual(len(self.recipes), 4)
         recipe = self.recipes[0]
         self.begin()
         followed, left_alone = Filter(recipe), Filter(recipe)

@@ -55,6 +55,17 @@ TEST(RenderDrive, TheRightCameraCanBeLate) {
   EXPECT_EQ(0.0, cv::norm(late.right, after.right, cv::NORM_INF));
 }
 
+TEST(RenderDrive, AMountShiftsAndTurnsTheCameraInTheSameWorld) {
+  const DrivePath path = makePresetPath("straight", 4, 10.0, 1);
+  RenderOptions options = plainOptions();
+  const StereoPair ahead = renderOne(path, options, 0);
+  options.mount.x = smallCamera().baseline;
+  const StereoPair shifted = renderOne(path, options, 0);
+  EXPECT_LT(meanDifference(shifted.left, ahead.right), 0.01);
+  options.mount.yaw = 180.0;
+  EXPECT_GT(meanDifference(renderOne(path, options, 0).left, ahead.left), 5.0);
+}
+
 TEST(RenderDrive, ARollingShutterTakesTheFirstRowsEarlierAndTheLastOnesLater) {
   const DrivePath path = makePresetPath("straight", 4, 10.0, 1);
   RenderOptions options = plainOptions();
