@@ -16,6 +16,7 @@ COMMANDS = {
     "experiments": ("experiments", "the paper's experiments"),
     "tables": ("tables", "tables of the paper's experiments from their CSV files"),
     "golden": ("golden", "poses, states and covariances of two builds"),
+    "shutters": ("shutters", "rolling shutters: ignored, estimated, known"),
     "two-cameras": ("two_cameras", "two cameras of one robot, fused by robot_localization"),
     "guises": ("guises", "a drive turned, cut, spoilt or in another order"),
     "film": ("film", "moving picture of a drive: features and path"),

@@ -133,15 +133,15 @@ StampedTrajectory OfflineRun::stampedPoses() const {
 void OfflineRun::writeTiming(const std::string& path) const {
   std::ostringstream file;
   file << "frame,total_ms,detect_ms,stereo_ms,describe_ms,match_ms,motion_ms,detected,features,matches,inliers,rms_px,"
-          "coverage,right_delay_ms,right_delay_sigma_ms,state,reason\n";
+          "coverage,right_delay_ms,right_delay_sigma_ms,readout_ms,readout_sigma_ms,state,reason\n";
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const auto& [odometry, extraction, total_time] = frames_[i];
     file << i << "," << 1e3 * total_time << "," << 1e3 * extraction.detect_time << "," << 1e3 * extraction.stereo_time
          << "," << 1e3 * extraction.describe_time << "," << 1e3 * odometry.match_time << ","
          << 1e3 * odometry.motion_time << "," << extraction.detected << "," << odometry.features << ","
          << odometry.matches << "," << odometry.inliers << "," << odometry.rms << "," << odometry.coverage << ","
-         << 1e3 * odometry.right_delay << "," << 1e3 * odometry.right_delay_sigma << "," << toString(odometry.state)
-         << "," << withoutCommas(odometry.reason) << "\n";
+         << 1e3 * odometry.right_delay << "," << 1e3 * odometry.right_delay_sigma << "," << 1e3 * odometry.readout << ","
+         << 1e3 * odometry.readout_sigma << "," << toString(odometry.state) << "," << withoutCommas(odometry.reason) << "\n";
   }
   writeTextFile(path, file.str());
 }
