@@ -276,7 +276,6 @@ struct AddPoint {
         columns.addProduct<-1>(factors[k].Y.data(), equations->ofPoses(factors[k].pose, factors[other].pose));
     }
 
-    *result = {};
     for (int k = 0; k < 3; ++k) {
       for (int l = 0; l < 3; ++l) result->R(k, l) = R[k][l], result->by_calibration(l, k) = reduced_calibration[k][l];
       result->gradient[k] = reduced[k];
