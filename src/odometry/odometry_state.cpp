@@ -31,7 +31,7 @@ void reportMatches(const StereoFeatures& features, const std::vector<int>& given
 }
 
 void reportRig(const LearntRig& rig, OdometryResult& result) {
-  const RigEstimate known = rig.calibration.used();
+  const RigEstimate known = rig.calibration.compensated();
   if (rig.calibration.hasWindow()) {
     const RigEstimate::Vector sigma = known.covariance.diagonal().cwiseSqrt();
     if (rig.calibration.isEstimated()) {

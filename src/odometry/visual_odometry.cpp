@@ -485,11 +485,11 @@ void VisualOdometry::Impl::commit(const Candidate& candidate, const Belief& beli
   if (isDoubtful(belief)) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
-  state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration_by_rig,
-                              candidate.calibration, adjustment.calibration_information);
+  state_.rig.calibration.update(state_.map->oldestId(), state_.map->newestId(), candidate.calibration_by_rig,
+                                candidate.calibration, adjustment.calibration_information);
   if (isDoubtful(belief)) return;
   state_.rig.noise.learnPair(adjustment.newest_square);
-  if (adjustment.common_disparity_square) state_.rig.calibration.noteCommon(*adjustment.common_disparity_square);
+  if (adjustment.common_disparity_square) state_.rig.calibration.updateCommon(*adjustment.common_disparity_square);
 }
 
 /// The motion between the two reported poses, and its covariance.

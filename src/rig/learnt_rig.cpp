@@ -113,9 +113,10 @@ void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measur
     readout.add(measured->features, found, measured->since_reference);
   else
     readout.interrupt();
-  if (const auto delay = right_delay.estimate()) calibration.noteRows(RigEstimate::kDelay, delay->value, delay->sigma);
+  if (const auto delay = right_delay.estimate())
+    calibration.updateByRows(RigEstimate::kDelay, delay->value, delay->sigma);
   if (const auto by_rows = row_pattern.rotation())
-    calibration.noteRows(RigEstimate::kRoll, by_rows->value.z(), std::sqrt(withRectification(*by_rows)(2, 2)));
+    calibration.updateByRows(RigEstimate::kRoll, by_rows->value.z(), std::sqrt(withRectification(*by_rows)(2, 2)));
 }
 
 }  // namespace sdvo
