@@ -53,7 +53,7 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
     const double velocity = (camera.project(now).y() - found.view->pixels[reference].y) / dt;
     const double dv = has_pattern ? pattern.change(features, current) : features.dv[current];
     rows.push_back({velocity, dv - delay * velocity,
-                    RowDelay::cellOf(features.u[current], features.v[current], camera.width, camera.height)});
+                    RowDelay::partOf(features.u[current], features.v[current], camera.width, camera.height)});
   }
   return rows;
 }

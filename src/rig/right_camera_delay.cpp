@@ -148,7 +148,7 @@ void RightCameraDelay::addRows(double dt, double known) {
   for (int i = 0; i < features.count(); ++i) {
     const Synchronised step = sdvo::synchronised(features, i, delay, during);
     const RightFlow turning = rightFlow(features.camera, slow, features.u[i] - features.disparity[i], features.v[i]);
-    rows.push_back({RowDelay::cellOf(features.u[i], features.v[i], features.camera.width, features.camera.height),
+    rows.push_back({RowDelay::partOf(features.u[i], features.v[i], features.camera.width, features.camera.height),
                     features.dv[i] - stamped * step.flow.y(), step.flow.y(), turning.far.y(), step.disparity});
   }
   rows_.add(rows);

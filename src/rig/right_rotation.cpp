@@ -127,7 +127,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
   some.reserve(inliers.size()), parts.reserve(inliers.size());
   for (const int i : inliers) {
     const Correspondence& c = some.emplace_back(correspondences[static_cast<std::size_t>(i)]);
-    parts.push_back(RowDelay::cellOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height));
+    parts.push_back(RowDelay::partOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height));
   }
   const CorrespondenceArrays arrays(some);
   const std::ptrdiff_t stride = CorrespondenceArrays::roundedUp(arrays.count());
