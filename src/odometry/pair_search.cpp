@@ -48,7 +48,7 @@ void PairSearch::take(const StereoCamera& lens) {
   lens_ = lens;
   refocused_.reset(), new_part_.reset(), rotated_back_.reset(), synchronised_.reset();
   newest_.reset(), map_.reset();
-  rotation_ = ShownRotation();
+  rotation_ = RotationHypothesis();
   if (lens != given_.camera) refocused_ = given_, refocused_->camera = lens;
   if (state_.camera && *state_.camera != lens && state_.camera->isLike(lens))
     refocused_ = whole().seenBy(*state_.camera);
@@ -213,16 +213,16 @@ Vector6d PairSearch::findGlobal() {
   return velocity;
 }
 
-/// Rotation of the right camera, with a `supposed` one that is compensated already, rad.
-ShownRotation PairSearch::shownBeyond(const Eigen::Vector3d& supposed) {
+/// New rotation of the right camera; features are rotated back by its part `compensated`, rad, already.
+RotationHypothesis PairSearch::rotationBeyond(const Eigen::Vector3d& compensated) {
   const Vector6d velocity = findGlobal();
   const Eigen::Vector3d turn = dt_ * velocity.tail<3>();
   const Eigen::Vector3d before = dt_ * state_.prior.velocity().value_or(Vector6d::Zero()).tail<3>();
   const Eigen::Matrix3d turns = turn * turn.transpose() + before * before.transpose();
-  return state_.rig.shownRotation(features(), found_, supposed, turns, dt_);
+  return state_.rig.rotationHypothesis(features(), found_, compensated, turns, dt_);
 }
 
-void PairSearch::compensateFor(const ShownRotation& rotation) {
+void PairSearch::compensateFor(const RotationHypothesis& rotation) {
   rotation_ = rotation;
   compensate();
 }
@@ -230,14 +230,14 @@ void PairSearch::compensateFor(const ShownRotation& rotation) {
 /// If the right camera seems to have rotated, features are compensated again and the search is repeated. Without a
 /// motion of most matches, a yaw of the right camera is tried; it is kept if more matches agree.
 void PairSearch::findRotated() {
-  rotation_ = shownBeyond(Eigen::Vector3d::Zero());
+  rotation_ = rotationBeyond(Eigen::Vector3d::Zero());
   if (kind_ == kFollowed && scene_->T_current_reference && !found_.isOfMajority()) {
     // After a knock beyond the matches' noise no motion explains both views, but the left one alone may be explained.
-    const ShownRotation at_first = rotation_;
+    const RotationHypothesis at_first = rotation_;
     const int inliers = found_.agreement.inliers;
     const Eigen::Vector3d yaw = yawByDisparities(given_.camera, found_.correspondences, *scene_->T_current_reference);
     compensateFor({yaw, Eigen::Matrix3d::Zero(), kCertain, kUnsuspected});
-    rotation_ = shownBeyond(yaw);
+    rotation_ = rotationBeyond(yaw);
     if (!found_.motion.success || found_.agreement.inliers <= inliers || !(rotation_.log_odds > 0.0))
       compensateFor(at_first), findGlobal();
   }

@@ -54,7 +54,7 @@ class PairSearch {
   bool refutesCamera() const { return lens_ != given_.camera; }
 
   /// New rotation of the right camera, for which features are compensated if it is likely.
-  const ShownRotation& rotation() const { return rotation_; }
+  const RotationHypothesis& rotation() const { return rotation_; }
   /// The pair before its rows were moved to the stamp; only with a rolling shutter.
   std::optional<RolledPair>& rolled() { return rolled_; }
 
@@ -80,8 +80,8 @@ class PairSearch {
   Vector6d find();
   Vector6d findSynchronised();
   Vector6d findGlobal();
-  ShownRotation shownBeyond(const Eigen::Vector3d& supposed);
-  void compensateFor(const ShownRotation& rotation);
+  RotationHypothesis rotationBeyond(const Eigen::Vector3d& compensated);
+  void compensateFor(const RotationHypothesis& rotation);
   void findRotated();
   MotionScene sceneOf(const LocalMap& map, double dt, const std::optional<MotionGuess>& guess) const;
   std::optional<MotionScene> reacquired() const;
@@ -101,7 +101,7 @@ class PairSearch {
   std::optional<StereoFeatures> global_;  // rows moved to the stamp
   std::optional<RolledPair> newest_;      // of the map, with its velocity since the pair's motion is known
   std::optional<LocalMap> map_;           // with this velocity
-  ShownRotation rotation_;
+  RotationHypothesis rotation_;
   std::optional<MotionScene> scene_;
   MotionHypothesis found_;
 };

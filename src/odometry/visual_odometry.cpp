@@ -105,7 +105,7 @@ class VisualOdometry::Impl {
 
   void begin(const PairSearch& pair, const std::optional<MotionGuess>& guess);
   std::optional<MeasuredPair> measuredPair(const PairSearch& pair) const;
-  std::vector<Evidence> evidenceAgainst(const PairSearch& pair, const std::optional<MeasuredPair>& measured);
+  std::vector<Evidence> evidenceAgainst(const PairSearch& pair, const std::optional<MeasuredPair>& measured) const;
   Step unmeasured(const PairSearch& pair, const std::string& why, const std::vector<Evidence>& evidence);
   Outcome judged(PairSearch& pair);
   Candidate adjustBeyondDoubt(PairSearch& pair);
@@ -209,6 +209,9 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   Stopwatch stopwatch;
   begin(pair, guess);
   const std::optional<MeasuredPair> measured = measuredPair(pair);
+  if (measured)
+    state_.rig.right_delay.updateOtherPair(measured->rows, measured->dt,
+                                           options_.noise.corner * state_.rig.noise.scale());
   const std::vector<Evidence> evidence = evidenceAgainst(pair, measured);
   const Outcome outcome = judged(pair);
   Step step = outcome.candidate ? apply(outcome, pair, evidence) : unmeasured(pair, outcome.refusal, evidence);
@@ -264,12 +267,12 @@ std::optional<MeasuredPair> VisualOdometry::Impl::measuredPair(const PairSearch&
 
 /// Evidence of the pair that its motion is not the camera's.
 std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const PairSearch& pair,
-                                                            const std::optional<MeasuredPair>& measured) {
-  LearntRig& rig = state_.rig;
+                                                            const std::optional<MeasuredPair>& measured) const {
   const bool is_followed = pair.kind() == PairSearch::kFollowed;
   // The map is from before the rotation.
-  std::vector<Evidence> evidence{{pair.rotation().log_odds, pair.rotation().words()},
-                                 {pair.rotation().other_moment, "the right image seemed to be of another moment"}};
+  std::vector<Evidence> evidence{
+      {pair.rotation().log_odds, pair.rotation().words()},
+      {pair.rotation().log_odds_of_other_moment, "the right image seemed to be of another moment"}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
   if (is_followed)
     evidence.push_back({pair.frozen(), "images as of the previous pair, by a stop or a frozen driver", true});
@@ -278,8 +281,7 @@ std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const PairSearch& pa
       pair.dt() <= options_.tracking.max_gap)
     evidence.push_back({kCertain, "many matches agreed on no motion", true});
   if (!measured) return evidence;
-  rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
-  const RightCameraDelay::OtherPair other = rig.right_delay.otherPair(measured->dt);
+  const RightCameraDelay::OtherPair other = state_.rig.right_delay.otherPair(measured->dt);
   evidence.push_back({other.log_odds, other.words()});
   evidence.push_back(
       {kUnsuspected + state_.prior.logRatioOfSwap(measured->T_current_reference.inverse(), measured->since_reference),

@@ -98,13 +98,13 @@ double logRatioOfDelay(const std::vector<RowMotion>& rows, double delay, double 
 
 RightCameraDelay::RightCameraDelay() : rows_(RowDelay::kMemory, kLeastTurning, kSamePoints) {}
 
-void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, double row_error) {
+void RightCameraDelay::updateOtherPair(const std::vector<RowMotion>& rows, double dt, double row_error) {
   if (rows.size() < kFewestMeasured || !(dt > 0.0)) return;
-  for (auto* other : {&earlier_, &later_}) {
+  for (auto* other : {&log_odds_earlier_, &log_odds_later_}) {
     // Evidence fades without renewal, because a standing camera gives none.
     const double carried = kUnsuspected + kUsualMemory * (*other - kUnsuspected);
-    *other =
-        std::clamp(carried + logRatioOfDelay(rows, other == &earlier_ ? -dt : dt, row_error), kUnsuspected, kCertain);
+    *other = std::clamp(carried + logRatioOfDelay(rows, other == &log_odds_earlier_ ? -dt : dt, row_error),
+                        kUnsuspected, kCertain);
   }
 }
 
@@ -123,7 +123,7 @@ void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Ve
 }
 
 RightCameraDelay::OtherPair RightCameraDelay::otherPair(double dt) const {
-  return earlier_ > later_ ? OtherPair{-dt, earlier_} : OtherPair{dt, later_};
+  return log_odds_earlier_ > log_odds_later_ ? OtherPair{-dt, log_odds_earlier_} : OtherPair{dt, log_odds_later_};
 }
 
 std::string RightCameraDelay::OtherPair::words() const {
