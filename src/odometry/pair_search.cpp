@@ -19,7 +19,7 @@ PairSearch::PairSearch(const VisualOdometryOptions& options, const SearchTools& 
     : options_(options), tools_(tools), state_(state), given_(given), guess_(guess) {
   if (state.last_stamp) dt_ = static_cast<double>(given.stamp - *state.last_stamp) * 1e-9;
   searchBy(given.camera);
-  if (kind_ != kFollowed || !state.lens || !state.lens->isLike(given.camera) || !movesFeatures(*state.lens)) return;
+  if (kind_ != kContinues || !state.lens || !state.lens->isLike(given.camera) || !movesFeatures(*state.lens)) return;
   // Either the lens moved, or camera_info changed without it: a fault of the driver, or a new calibration.
   const double by_given = logLikelihood();
   searchBy(*state.lens);
@@ -31,13 +31,13 @@ PairSearch::PairSearch(const VisualOdometryOptions& options, const SearchTools& 
 void PairSearch::searchBy(const StereoCamera& lens) {
   take(lens);
   if (!state_.map || !state_.map->continuedBy(taken()))
-    kind_ = kFirst;
+    kind_ = kNoMap;
   else if (state_.interrupted)
-    kind_ = kSought;
+    kind_ = kAfterOutage;
   else if ((frozen_ = logOddsOfFrozen()) >= kCertain)
     kind_ = kFrozen;
   else
-    kind_ = kFollowed;
+    kind_ = kContinues;
   compensate();
   findRotated();
 }
@@ -125,7 +125,7 @@ void PairSearch::compensate() {
   const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + rotation_.value) : rig.rotation;
   rotated_back_.reset();
   if (!rotation.isZero()) rotated_back_ = rotatedBack(part(), rotation);
-  const bool has_map = kind_ == kFollowed || kind_ == kSought;
+  const bool has_map = kind_ == kContinues || kind_ == kAfterOutage;
   const bool is_predicted = has_map && state_.prior.velocity() && dt_ <= options_.tracking.max_gap;
   if (is_predicted) synchronised_ = synchronised(*state_.prior.velocity());
   roll(is_predicted ? *state_.prior.velocity() : Vector6d::Zero());
@@ -158,7 +158,7 @@ bool PairSearch::rollAgain() {
   now.forgetMotion();
   now.rate_by_rows = shutter.rateByRows(now, found_);
   bool has_changed = false;
-  if (kind_ == kFollowed) {
+  if (kind_ == kContinues) {
     const Eigen::Isometry3d motion = found_.motion.T_current_reference.inverse();
     now.dt = state_.prior.interval(state_.map->secondsUntil(now.features), motion);
     now.mean = logSE3(motion) / now.dt;
@@ -180,11 +180,12 @@ bool PairSearch::rollAgain() {
   return has_changed;
 }
 
-/// Searches in the map, after an outage also in the seed. Returns the camera's velocity; zero if nothing is found.
+/// Searches in the map, after an outage also in the earlier map and the fallback map. Returns the camera's velocity;
+/// zero if nothing is found.
 Vector6d PairSearch::find() {
   scene_.reset();
-  if (kind_ == kFollowed) scene_.emplace(sceneOf(map_ ? *map_ : *state_.map, dt_, guess_));
-  if (kind_ == kSought)
+  if (kind_ == kContinues) scene_.emplace(sceneOf(map_ ? *map_ : *state_.map, dt_, guess_));
+  if (kind_ == kAfterOutage)
     if (auto place = reacquired()) scene_.emplace(std::move(*place));
   found_ = scene_ ? tools_.motions.find(*scene_, largestDoubt(options_.tracking)) : MotionHypothesis();
   if (!found_.motion.success) return Vector6d::Zero();
@@ -196,7 +197,7 @@ Vector6d PairSearch::find() {
 Vector6d PairSearch::findSynchronised() {
   constexpr double kNegligible = 0.02;  // px (chosen): a fifth of a disparity's noise
   const Vector6d velocity = find();
-  if (kind_ != kFollowed || !synchronised_ || !found_.motion.success) return velocity;
+  if (kind_ != kContinues || !synchronised_ || !found_.motion.success) return velocity;
   const double delay = taken().right_delay + state_.rig.calibration.delay();
   const double unexpected = (velocity - *state_.prior.velocity()).tail<3>().norm();
   if (std::abs(delay) * given_.camera.fx * unexpected < kNegligible) return velocity;
@@ -231,7 +232,7 @@ void PairSearch::compensateFor(const RotationHypothesis& rotation) {
 /// motion of most matches, a yaw of the right camera is tried; it is kept if more matches agree.
 void PairSearch::findRotated() {
   rotation_ = rotationBeyond(Eigen::Vector3d::Zero());
-  if (kind_ == kFollowed && scene_->T_current_reference && !found_.isOfMajority()) {
+  if (kind_ == kContinues && scene_->T_current_reference && !found_.isOfMajority()) {
     // After a knock beyond the matches' noise no motion explains both views, but the left one alone may be explained.
     const RotationHypothesis at_first = rotation_;
     const int inliers = found_.agreement.inliers;
@@ -272,11 +273,11 @@ MotionScene PairSearch::sceneOf(const LocalMap& map, double dt, const std::optio
   return scene;
 }
 
-/// Where the pair is in the map from before an outage, in the one before that, then in the seed. The camera's motion
-/// meanwhile is unknown.
+/// Where the pair is in the map from before the outage, in the earlier map, else in the fallback map. The camera's
+/// motion meanwhile is unknown.
 std::optional<MotionScene> PairSearch::reacquired() const {
   std::optional<MotionScene> scene;
-  for (const LocalMap* map : {&*state_.map, state_.left ? &state_.left->map : nullptr}) {
+  for (const LocalMap* map : {&*state_.map, state_.earlier ? &state_.earlier->map : nullptr}) {
     if (!map || !map->continuedBy(features())) continue;
     const auto place = tools_.places.find(*map, features(), state_.rig.calibration.calibration());
     const double since = map->secondsUntil(features());
@@ -287,7 +288,7 @@ std::optional<MotionScene> PairSearch::reacquired() const {
     scene->prior.clear();
     return scene;
   }
-  if (state_.seed) scene.emplace(sceneOf(*state_.seed, 0.0, std::nullopt));
+  if (state_.fallback_map) scene.emplace(sceneOf(*state_.fallback_map, 0.0, std::nullopt));
   return scene;
 }
 

@@ -33,8 +33,12 @@ class PairSearch {
   PairSearch(const PairSearch&) = delete;  // its parts refer to each other
   PairSearch& operator=(const PairSearch&) = delete;
 
-  /// Without a map of its camera; after an outage; with repeated images; after a pose.
-  enum Kind { kFirst, kSought, kFrozen, kFollowed };
+  enum Kind {
+    kNoMap,        ///< no map of its camera: it begins one
+    kAfterOutage,  ///< its pose in the map is unknown: it is looked for in all maps
+    kFrozen,       ///< its images repeat although the camera moved: nothing is searched
+    kContinues,    ///< the pair before has a pose in the map: the motion is searched near the expected one
+  };
   Kind kind() const { return kind_; }
 
   double dt() const { return dt_; }          ///< since the previous pair, s
@@ -77,12 +81,13 @@ class PairSearch {
   std::optional<StereoFeatures> synchronised(const Vector6d& velocity) const;
   void roll(const Vector6d& velocity);
   bool rollAgain();
+  // Each of the next four repeats the one before it with features that are compensated better.
   Vector6d find();
   Vector6d findSynchronised();
   Vector6d findGlobal();
+  void findRotated();
   RotationHypothesis rotationBeyond(const Eigen::Vector3d& compensated);
   void compensateFor(const RotationHypothesis& rotation);
-  void findRotated();
   MotionScene sceneOf(const LocalMap& map, double dt, const std::optional<MotionGuess>& guess) const;
   std::optional<MotionScene> reacquired() const;
 
@@ -92,7 +97,7 @@ class PairSearch {
   const StereoFeatures& given_;
   const std::optional<MotionGuess>& guess_;
   StereoCamera lens_;
-  Kind kind_ = kFirst;
+  Kind kind_ = kNoMap;
   double dt_ = 0.0;
   double frozen_ = kUnsuspected;
   std::vector<int> new_features_;

@@ -93,14 +93,14 @@ class VisualOdometry::Impl {
   struct Outcome {
     std::string refusal;
     std::optional<Candidate> candidate;
-    double since = 0.0;         ///< the map's newest pair, s
-    bool is_seed = false;       ///< it is measured against the seed, ...
-    bool starts_again = false;  ///< ... whose pose is not that of the guesses
-    bool comes_back = false;    ///< it is in the map that was left
+    double since = 0.0;           ///< the map's newest pair, s
+    bool in_fallback = false;     ///< it is measured against the fallback map, ...
+    bool starts_again = false;    ///< ... whose pose is not that of the guesses
+    bool in_earlier_map = false;  ///< it is found in the map from before a restart
   };
 
   void refuse(const StereoFeatures& features) const;
-  OdometryResult sound(OdometryResult result);
+  OdometryResult checkedResult(OdometryResult result);
   std::optional<Floor> floor() const;
 
   void begin(const PairSearch& pair, const std::optional<MotionGuess>& guess);
@@ -193,7 +193,7 @@ void VisualOdometry::Impl::takePose(const Matrix6d& covariance) {
   given.has_pose = true, given.pose_covariance = covariance;
   if (const std::string defect = given.defect(); !defect.empty()) throw std::invalid_argument(defect);
   state_.covariance.reset(covariance);
-  state_.left.reset();  // its poses are from before
+  state_.earlier.reset();  // its poses are from before
   ++state_.epoch;
   if (!state_.interrupted) return;
   state_.map.reset();
@@ -222,7 +222,8 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   if (options_.calibration.enabled && options_.calibration.readout == 0.0)
     state_.shutter.setReadout(state_.rig.readout.proved());
   step.time = stopwatch.lap();
-  const OdometryResult result = sound(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
+  const OdometryResult result =
+      checkedResult(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
   // A driver's fault is short: a calibration that lasts is new.
   if (result.has_pose && pair.refutesCamera() &&
       1e-9 * static_cast<double>(given.stamp - *state_.lens_stamp) > options_.tracking.max_gap)
@@ -230,11 +231,11 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   return result;
 }
 
-/// The only way out of update(): no result leaves with a number that is not finite or a covariance that is none.
-OdometryResult VisualOdometry::Impl::sound(OdometryResult result) {
+/// The only way out of update(): no result leaves with a number that is not finite or an indefinite covariance.
+OdometryResult VisualOdometry::Impl::checkedResult(OdometryResult result) {
   const std::string defect = result.defect();
   if (defect.empty()) {
-    if (result.has_pose) state_.sound = result;
+    if (result.has_pose) state_.last_sound = result;
     return result;
   }
   state_.recover(options_);
@@ -268,16 +269,16 @@ std::optional<MeasuredPair> VisualOdometry::Impl::measuredPair(const PairSearch&
 /// Evidence of the pair that its motion is not the camera's.
 std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const PairSearch& pair,
                                                             const std::optional<MeasuredPair>& measured) const {
-  const bool is_followed = pair.kind() == PairSearch::kFollowed;
+  const bool continues = pair.kind() == PairSearch::kContinues;
   // The map is from before the rotation.
   std::vector<Evidence> evidence{
       {pair.rotation().log_odds, pair.rotation().words()},
       {pair.rotation().log_odds_of_other_moment, "the right image seemed to be of another moment"}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
-  if (is_followed)
+  if (continues)
     evidence.push_back({pair.frozen(), "images as of the previous pair, by a stop or a frozen driver", true});
   // After a short gap, the views may not be of one rigid world, and the next map would be as wrong.
-  if (is_followed && !pair.found().motion.success && pair.found().agreement.matches >= kManyMatches &&
+  if (continues && !pair.found().motion.success && pair.found().agreement.matches >= kManyMatches &&
       pair.dt() <= options_.tracking.max_gap)
     evidence.push_back({kCertain, "many matches agreed on no motion", true});
   if (!measured) return evidence;
@@ -315,9 +316,9 @@ VisualOdometry::Impl::Outcome VisualOdometry::Impl::judged(PairSearch& pair) {
   if (!found.motion.success) return outcome;
   const MotionScene& scene = *pair.scene();
   outcome.since = scene.map.secondsUntil(pair.features());
-  outcome.is_seed = state_.seed && &scene.map == &*state_.seed;
-  outcome.starts_again = outcome.is_seed && !state_.seed_has_pose;
-  outcome.comes_back = state_.left && &scene.map == &state_.left->map;
+  outcome.in_fallback = state_.fallback_map && &scene.map == &*state_.fallback_map;
+  outcome.starts_again = outcome.in_fallback && !state_.fallback_has_pose;
+  outcome.in_earlier_map = state_.earlier && &scene.map == &state_.earlier->map;
   outcome.refusal =
       state_.prior.tooFast(found.motion.T_current_reference.inverse(), found.motion.covariance, outcome.since);
   if (!outcome.refusal.empty()) return outcome;
@@ -337,7 +338,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::unmeasured(const PairSearch& pa
                                                             const std::vector<Evidence>& evidence) {
   state_.doubt.raise(evidence);
   if (pair.kind() == PairSearch::kFrozen) return holdPose(pair.dt(), state_);
-  if (pair.kind() == PairSearch::kFollowed) return predictMotion(options_, pair.features(), pair.dt(), why, state_);
+  if (pair.kind() == PairSearch::kContinues) return predictMotion(options_, pair.features(), pair.dt(), why, state_);
   return startMap(options_, pair.features(), state_);
 }
 
@@ -346,8 +347,8 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, c
                                                        const std::vector<Evidence>& evidence) {
   const MotionHypothesis& found = pair.found();
   if (outcome.starts_again) state_.startAgain();
-  if (outcome.comes_back) state_.comeBack();
-  if (outcome.is_seed) state_.covariance.beginMap();
+  if (outcome.in_earlier_map) state_.returnToEarlierMap();
+  if (outcome.in_fallback) state_.covariance.beginMap();
   const Belief belief = state_.doubt.update(*pair.scene(), found, evidence);
   commit(*outcome.candidate, belief);
   Step step = measure(found, *outcome.candidate);
@@ -356,7 +357,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, c
   const std::string doubt = doubtWords(pair, *outcome.candidate, belief);
   step.state = doubt.empty() && !outcome.starts_again ? TrackingState::kTracking : TrackingState::kDegraded;
   step.probability = belief.probability;
-  step.changes_epoch = outcome.starts_again || outcome.comes_back;
+  step.changes_epoch = outcome.starts_again || outcome.in_earlier_map;
   if (!doubt.empty()) step.reason = "doubtful: " + doubt;
   // A motion that is probably not the camera's predicts nothing.
   if (belief.probability >= 0.5)
@@ -375,11 +376,11 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, c
 /// A motion is measured: forgets what an outage left. Returns how it ended; empty if there was none.
 std::string VisualOdometry::Impl::endOutage(const Outcome& outcome, const MotionHypothesis& found) {
   state_.outage.end();
-  state_.seed.reset();
-  if (outcome.comes_back) state_.left.reset();
+  state_.fallback_map.reset();
+  if (outcome.in_earlier_map) state_.earlier.reset();
   if (!std::exchange(state_.interrupted, false)) return "";
   if (outcome.starts_again) return kStartedAgain;
-  if (outcome.is_seed) return "goes on where the guess had the camera";
+  if (outcome.in_fallback) return "goes on where the guess had the camera";
   return "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map";
 }
 
@@ -530,7 +531,7 @@ void VisualOdometry::Impl::rememberRolled(PairSearch& pair, Step& step) {
   const auto ends_with_it = [&](const std::optional<LocalMap>& map) {
     return map && map->newestStamp() == pair.features().stamp;
   };
-  if (!pair.rolled() || (!ends_with_it(state_.map) && !ends_with_it(state_.seed))) return;
+  if (!pair.rolled() || (!ends_with_it(state_.map) && !ends_with_it(state_.fallback_map))) return;
   RolledPair& rolled = *pair.rolled();
   if (!pair.found().motion.success || !step.T_previous_current) {
     rolled.forgetMotion();
