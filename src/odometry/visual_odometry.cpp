@@ -220,7 +220,7 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   finish(pair, step);
   rememberRolled(pair, step);
   if (options_.calibration.enabled && options_.calibration.readout == 0.0)
-    state_.shutter.setReadout(state_.rig.readout.proved());
+    state_.shutter.setReadout(state_.rig.readout.usableValue());
   step.time = stopwatch.lap();
   const OdometryResult result =
       checkedResult(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
@@ -536,7 +536,7 @@ void VisualOdometry::Impl::rememberRolled(PairSearch& pair, Step& step) {
   if (!pair.found().motion.success || !step.T_previous_current) {
     rolled.forgetMotion();
   } else {
-    const Matrix6d moment = state_.shutter.momentOf(rolled);
+    const Matrix6d moment = state_.shutter.covarianceByVelocity(rolled);
     step.covariance += moment;
     state_.covariance.addDoubt(moment, moment);
   }

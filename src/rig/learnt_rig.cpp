@@ -18,12 +18,12 @@ Eigen::Matrix3d withRectification(const RightRotation& measured) {
 }
 
 /// Log-likelihood ratio that the rotation, for which features are compensated, moved the rows, against a fault of the
-/// disparities alone. `left`: what rows show after the compensation.
-double logRatioOfRows(const std::optional<RightRotation>& left, const Eigen::Vector3d& rotation) {
-  if (!left) return 0.0;
-  const Eigen::Matrix3d information = withRectification(*left).inverse();
-  const Eigen::Vector3d before = left->value + rotation;
-  return 0.5 * (before.dot(information * before) - left->value.dot(information * left->value));
+/// disparities alone. `remaining`: rotation by rows after the compensation.
+double logRatioOfRows(const std::optional<RightRotation>& remaining, const Eigen::Vector3d& rotation) {
+  if (!remaining) return 0.0;
+  const Eigen::Matrix3d information = withRectification(*remaining).inverse();
+  const Eigen::Vector3d before = remaining->value + rotation;
+  return 0.5 * (before.dot(information * before) - remaining->value.dot(information * remaining->value));
 }
 
 /// log(1 + exp(x)), for any x.
@@ -77,7 +77,7 @@ RotationHypothesis LearntRig::rotationHypothesis(const StereoFeatures& features,
     return logBayesFactor<3>(hypothesis.value, hypothesis.covariance.inverse(), prior);
   };
   const double knock = kUnsuspected + log_factor(kKnock * kKnock * Eigen::Matrix3d::Identity());
-  const double other_moment = driver_fault_ + log_factor(turns);
+  const double other_moment = log_prior_of_other_moment_ + log_factor(turns);
   hypothesis.log_odds = knock - logOnePlus(other_moment);
   if (!compensated.isZero()) hypothesis.log_odds = std::min(hypothesis.log_odds, logRatioOfRows(by_rows, compensated));
   hypothesis.log_odds_of_other_moment = other_moment - logOnePlus(knock);
@@ -99,7 +99,7 @@ RigEstimate::Matrix LearntRig::rotate(const RotationHypothesis& new_rotation, co
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
                       const RotationHypothesis& new_rotation, bool is_confirmed) {
-  driver_fault_ = features.report.refused ? kUnsuspected : driver_fault_ - std::log(2.0);
+  log_prior_of_other_moment_ = features.report.refused ? kUnsuspected : log_prior_of_other_moment_ - std::log(2.0);
   if (is_confirmed) {
     rotation_noise_ += (1.0 - kUsualMemory) * (new_rotation.value * new_rotation.value.transpose() - rotation_noise_);
     row_pattern.learn(features, measured ? measured->rows : std::vector<RowMotion>());

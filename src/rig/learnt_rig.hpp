@@ -68,9 +68,9 @@ struct LearntRig {
 
  private:
   NoiseOptions assumed_;
-  /// Log-odds of a right image of another moment. At a refused pair they are those of a knock. Each pair after it
-  /// halves the odds.
-  double driver_fault_ = -std::numeric_limits<double>::infinity();
+  /// Log-odds of a right image of another moment, before its rotation is considered. At a refused pair they are those
+  /// of a knock. Each pair after it halves the odds.
+  double log_prior_of_other_moment_ = -std::numeric_limits<double>::infinity();
   double delay_sigma_;                                         ///< s: standard deviation of the delay of one pair
   Eigen::Matrix3d rotation_noise_ = Eigen::Matrix3d::Zero();   ///< rad^2: second moment of confirmed pairs' rotations
   Eigen::Vector3d rotation_before_ = Eigen::Vector3d::Zero();  ///< before the last rotate()

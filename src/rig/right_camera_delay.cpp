@@ -53,22 +53,22 @@ Synchronised synchronised(const StereoFeatures& features, int i, double delay, c
 
 /// Mean velocity during the delay, from that at the pair and the means over the intervals before and after it.
 Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const Vector6d& at, const Vector6d& after) {
-  const double share = std::min(std::abs(delay) / dt, 1.0);
-  return at + share * ((delay < 0.0 ? before : after) - at);
+  const double ratio = std::min(std::abs(delay) / dt, 1.0);
+  return at + ratio * ((delay < 0.0 ? before : after) - at);
 }
 
 /// Mean squared residual (px^2, each cut off) of rows against a right image that is late by `delay` and lower by a
 /// constant.
 double misfit(const std::vector<RowMotion>& rows, double delay) {
   constexpr double kCut = 2.0 * RowDelay::kKernel;  // px: larger residuals are wrong matches
-  std::vector<double> rest;
-  rest.reserve(rows.size());
-  for (const RowMotion& row : rows) rest.push_back(row.dv - delay * row.velocity);
-  std::vector<double> sorted = rest;
+  std::vector<double> residuals;
+  residuals.reserve(rows.size());
+  for (const RowMotion& row : rows) residuals.push_back(row.dv - delay * row.velocity);
+  std::vector<double> sorted = residuals;
   const double middle = median(sorted);
   double sum = 0.0;
-  for (const double each : rest) sum += std::min((each - middle) * (each - middle), kCut * kCut);
-  return sum / static_cast<double>(rest.size());
+  for (const double each : residuals) sum += std::min((each - middle) * (each - middle), kCut * kCut);
+  return sum / static_cast<double>(residuals.size());
 }
 
 /// Ratio of the rows' apparent motion during `delay` that is error of the left image. Velocity and dv share this error,

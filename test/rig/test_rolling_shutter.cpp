@@ -113,7 +113,7 @@ TEST(RollingShutter, WeighsRowsByHowUnevenMotionsAre) {
     for (int k = 0; k < 100; ++k) shutter.learn(pair, turning() + (k % 2 == 0 ? 1.0 : -1.0) * unevenness);
     pair.rate_by_rows = RateByRows{turning().tail<3>() + more, 1e-4 * Eigen::Matrix3d::Identity(),
                                    Eigen::Matrix<double, 6, 3>::Constant(0.01)};
-    EXPECT_GE(shutter.momentOf(pair).trace(), 0.0);
+    EXPECT_GE(shutter.covarianceByVelocity(pair).trace(), 0.0);
     return (shutter.velocityAt(pair) - turning()).tail<3>().norm() / more.norm();
   };
   EXPECT_LT(expected_and_rows(Vector6d::Constant(1e-4)), 0.05);
