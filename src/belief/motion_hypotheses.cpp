@@ -141,17 +141,18 @@ class Explanations {
     return areDivided(of_a, only_b) || areDivided(of_b, only_a);
   }
 
-  /// The one whose strongest rival is the weakest: pairwise ratios compare different points, so no order may exist.
+  /// Minimax: the hypothesis whose largest log-odds against it are smallest. Pairwise ratios compare different points,
+  /// so they need not be transitive.
   std::size_t likeliest() const {
     const std::size_t count = hypotheses_.size();
-    std::vector<double> strongest(count, -std::numeric_limits<double>::infinity());
+    std::vector<double> against(count, -std::numeric_limits<double>::infinity());
     for (std::size_t a = 0; a < count; ++a)
       for (std::size_t b = 0; b < a; ++b) {
         const double ratio = logRatio(a, b);
-        strongest[a] = std::max(strongest[a], -ratio);
-        strongest[b] = std::max(strongest[b], ratio);
+        against[a] = std::max(against[a], -ratio);
+        against[b] = std::max(against[b], ratio);
       }
-    return static_cast<std::size_t>(std::min_element(strongest.begin(), strongest.end()) - strongest.begin());
+    return static_cast<std::size_t>(std::min_element(against.begin(), against.end()) - against.begin());
   }
 
  private:
@@ -187,12 +188,13 @@ class Explanations {
 /// A motion of features that the chosen one does not explain, more than chance gives.
 struct RivalMotion {
   std::size_t hypothesis;
-  double log_ratio;           ///< log-odds against the chosen one
+  double log_ratio;           ///< log-odds against the likeliest hypothesis
   std::vector<int> features;  ///< of the pair, explained by it alone
   bool is_torn;               ///< a row of the image separates both
 };
 
-/// Rivals of the chosen motion, each once. `likeliest` and `chosen` are estimates of one motion.
+/// Rivals of the chosen motion, each once. `chosen` is the estimate of the motion of `likeliest` with the most inliers.
+/// Log-odds are against `likeliest`; inliers are those of `chosen`.
 std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypothesis>& hypotheses,
                                   const Explanations& explanations, std::size_t likeliest, std::size_t chosen) {
   const std::vector<int> own = sorted(hypotheses[chosen].inlierFeatures());
@@ -358,9 +360,9 @@ bool agree(const StereoCamera& camera, const std::vector<Correspondence>& corres
   return 2 * static_cast<std::size_t>(same) > points.size();
 }
 
-double logLikelihood(double unexplained, int points) {
+double logLikelihood(double unexplained_sightings, int points) {
   if (points == 0) return 0.0;
-  return -effectiveNumber(points) * kLogOddsOfSighting * unexplained / points;
+  return -effectiveNumber(points) * kLogOddsOfSighting * unexplained_sightings / points;
 }
 
 double logAgreement(const Agreement& agreement) {

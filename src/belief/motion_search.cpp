@@ -55,7 +55,7 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   const double view_time = stopwatch.lap();
   MotionHypothesis found = searchNear(scene, view, expected, max_doubt);
   found.match_time += view_time;
-  const bool needs_rivals = scene.is_suspected || !isBeyondDoubt(found, max_doubt);
+  const bool needs_rivals = scene.all_compete || !isBeyondDoubt(found, max_doubt);
   if (!needs_rivals && refineByPatches(scene, false, found)) return found;
   found = chooseMotion(scene, options(scene).inlier_threshold, compete(scene, view, std::move(found)));
   if (found.motion.success) refineByPatches(scene, true, found);
@@ -129,7 +129,7 @@ MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPt
                                           double max_doubt) const {
   if (!T_current_reference || !matcher_.options().gating) return search(matcher_, scene, view, T_current_reference);
   double match_time = 0.0, motion_time = 0.0;
-  if (!scene.is_doubted) {
+  if (!scene.searches_wide) {
     MotionHypothesis found = search(matcher_, scene, view, T_current_reference);
     if (isBeyondDoubt(found, max_doubt) && !leavesGate(scene, *T_current_reference, found)) return found;
     match_time = found.match_time, motion_time = found.motion_time;

@@ -395,9 +395,9 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(PairSear
   const std::size_t adjusted = found.sightings.size();
   found.countInliers(candidate.adjustment.rejected);
   if (!was_beyond_doubt || motions.isBeyondDoubt(found, most)) return candidate;
-  MotionScene suspected = *pair.scene();
-  suspected.is_suspected = true;
-  MotionHypothesis chosen = motions.find(suspected, most);
+  MotionScene scene = *pair.scene();
+  scene.all_compete = true;
+  MotionHypothesis chosen = motions.find(scene, most);
   if (!chosen.motion.success) return candidate;
   const Eigen::Isometry3d T_adjusted = std::exchange(found, std::move(chosen)).motion.T_current_reference;
   // Mostly the first motion prevails, and its adjustment is known.
