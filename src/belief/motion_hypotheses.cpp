@@ -233,10 +233,9 @@ void compareWithRivals(const MotionScene& scene, const std::vector<MotionHypothe
   chosen.probability = mixture.probability();
   chosen.rivals_moment = mixture.moment();
   std::vector<int> explained;
-  for (std::size_t k = 0; k < rivals.size(); ++k) {
-    const RivalMotion& rival = rivals[k];
+  for (const RivalMotion& rival : rivals) {
     explained.insert(explained.end(), rival.features.begin(), rival.features.end());
-    const double probability = mixture.probability(mixture.alternatives()[k]);
+    const double probability = mixture.probability(rival.log_ratio);
     if (isTolerable(scene, chosen.motion.T_current_reference,
                     chosen.motion.T_current_reference * motionOf(rival).inverse()))
       chosen.probability += probability;
