@@ -79,7 +79,7 @@ bool isObject(const Points& points, const Points& others) {
 /// Whether a row of the image separates points from others, as in a torn or damaged image. Their numbers do not imply
 /// which part shows the camera's motion.
 bool areDivided(const Points& points, const Points& others) {
-  constexpr double kAstray = 0.1;  // of either side (chosen): some wrong matches agree by chance
+  constexpr double kWrongInliers = 0.1;  // of either side (chosen): some wrong matches agree by chance
   const auto rowsOf = [](const Points& pixels) {
     std::vector<double> rows;
     for (const Eigen::Vector2d& part : byParts(pixels)) rows.push_back(part.y());
@@ -89,8 +89,8 @@ bool areDivided(const Points& points, const Points& others) {
   const double all = static_cast<double>(rows.size() + other_rows.size());
   const double larger = static_cast<double>(std::max(rows.size(), other_rows.size()));
   if (std::pow(larger / all, all) >= kTailProbability) return false;
-  return quantile(rows, 1.0 - kAstray) <= quantile(other_rows, kAstray) ||
-         quantile(other_rows, 1.0 - kAstray) <= quantile(rows, kAstray);
+  return quantile(rows, 1.0 - kWrongInliers) <= quantile(other_rows, kWrongInliers) ||
+         quantile(other_rows, 1.0 - kWrongInliers) <= quantile(rows, kWrongInliers);
 }
 
 /// The matches that each hypothesis of a pair explains, among the matches of all hypotheses.
