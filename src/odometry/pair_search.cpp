@@ -109,7 +109,7 @@ double PairSearch::logOddsOfFrozen() const {
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
   if (guess_) turn.linear() = guess_->T_previous_current.linear();
   if (moved(turn)) return kCertain;
-  const auto prior = state_.prior.confirmed(*state_.last_stamp, dt_);
+  const auto prior = state_.prior.priorByConfirmed(*state_.last_stamp, dt_);
   const auto expected = expectedMotion(std::nullopt);
   if (!prior || !moved(expected.value_or(prior->motion))) return kUnsuspected;
   if (images.comeTwice()) return kCertain;
@@ -263,7 +263,7 @@ MotionScene PairSearch::sceneOf(const LocalMap& map, double dt, const std::optio
                     state_.rig.noise};
   const Eigen::Isometry3d T_reference_previous = map.newestPose() * state_.T_origin_camera;
   const double since = map.secondsUntil(features());
-  if (const auto confirmed = prior.confirmed(map.newestStamp(), since)) scene.prior.push_back(*confirmed);
+  if (const auto confirmed = prior.priorByConfirmed(map.newestStamp(), since)) scene.prior.push_back(*confirmed);
   if (prior.velocity() && dt <= options_.tracking.max_gap)
     scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
   if (guess) {
