@@ -161,12 +161,12 @@ bool PairSearch::rollAgain() {
   if (kind_ == kContinues) {
     const Eigen::Isometry3d motion = found_.motion.T_current_reference.inverse();
     now.dt = state_.prior.interval(state_.map->secondsUntil(now.features), motion);
-    now.mean = logSE3(motion) / now.dt;
+    now.mean_velocity = logSE3(motion) / now.dt;
     if (state_.newest && state_.newest->features.stamp == state_.map->newestStamp()) {
       const RolledPair& newest = *state_.newest;
-      now.mean_before = newest.mean;
+      now.mean_velocity_before = newest.mean_velocity;
       if (!newest_) newest_ = newest;
-      if (changes(*newest_, shutter.velocityBetween(newest, *now.mean))) {
+      if (changes(*newest_, shutter.velocityBetween(newest, *now.mean_velocity))) {
         has_changed = true;
         map_ = state_.map;
         map_->moveNewest(shutter.asGlobal(newest), shutter.asGlobal(*newest_), state_.rig.calibration.calibration());

@@ -540,7 +540,7 @@ void VisualOdometry::Impl::rememberRolled(PairSearch& pair, Step& step) {
     step.covariance += moment;
     state_.covariance.addDoubt(moment, moment);
   }
-  if (state_.newest && rolled.mean) state_.shutter.learn(*state_.newest, *rolled.mean);
+  if (state_.newest && rolled.mean_velocity) state_.shutter.learn(*state_.newest, *rolled.mean_velocity);
   state_.newest = std::move(pair.rolled());
 }
 

@@ -83,21 +83,22 @@ double RollingShutter::varianceAt(const RolledPair& pair) const {
 }
 
 Vector6d RollingShutter::velocityAt(const RolledPair& pair) const {
-  Vector6d velocity = pair.mean.value_or(Vector6d::Zero());
-  if (pair.mean && pair.mean_before) velocity += 0.25 * (*pair.mean - *pair.mean_before);
+  Vector6d velocity = pair.mean_velocity.value_or(Vector6d::Zero());
+  if (pair.mean_velocity && pair.mean_velocity_before)
+    velocity += 0.25 * (*pair.mean_velocity - *pair.mean_velocity_before);
   if (!pair.rate_by_rows) return velocity;
-  const Eigen::Matrix3d gain =
-      pair.mean ? gainOfRows(*pair.rate_by_rows, varianceAt(pair)) : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d gain = pair.mean_velocity ? gainOfRows(*pair.rate_by_rows, varianceAt(pair))
+                                                  : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
   velocity.tail<3>() += gain * (pair.rate_by_rows->value - velocity.tail<3>());
   return velocity;
 }
 
 Vector6d RollingShutter::velocityBetween(const RolledPair& pair, const Vector6d& next) const {
-  return pair.mean ? Vector6d(0.5 * (*pair.mean + next)) : next;
+  return pair.mean_velocity ? Vector6d(0.5 * (*pair.mean_velocity + next)) : next;
 }
 
 Matrix6d RollingShutter::covarianceByVelocity(const RolledPair& pair) const {
-  if (!pair.mean || !pair.rate_by_rows) return Matrix6d::Zero();
+  if (!pair.mean_velocity || !pair.rate_by_rows) return Matrix6d::Zero();
   const double variance = varianceAt(pair);
   const Eigen::Matrix3d covariance =
       variance * (Eigen::Matrix3d::Identity() - gainOfRows(*pair.rate_by_rows, variance));
@@ -108,9 +109,9 @@ Matrix6d RollingShutter::covarianceByVelocity(const RolledPair& pair) const {
 
 /// The second difference of three mean velocities has the variance a^2 dt.
 void RollingShutter::learn(const RolledPair& pair, const Vector6d& next) {
-  if (!pair.mean || !pair.mean_before) return;
+  if (!pair.mean_velocity || !pair.mean_velocity_before) return;
   constexpr double kMemory = 1.0 / (1.0 - kUsualMemory);  // pairs
-  const Eigen::Vector3d difference = (next - 2.0 * *pair.mean + *pair.mean_before).tail<3>();
+  const Eigen::Vector3d difference = (next - 2.0 * *pair.mean_velocity + *pair.mean_velocity_before).tail<3>();
   learnt_pairs_ = std::min(learnt_pairs_ + 1.0, kMemory);
   acceleration_square_ += (difference.squaredNorm() / (3.0 * pair.dt) - acceleration_square_) / (1.0 + learnt_pairs_);
 }

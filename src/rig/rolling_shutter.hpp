@@ -25,15 +25,15 @@ struct RateByRows {
 /// A pair as a rolling shutter took it, with the camera's velocities in its own frame, m/s and rad/s.
 struct RolledPair {
   StereoFeatures features;
-  double readout = 0.0;                   ///< s, see RollingShutter
-  Vector6d velocity = Vector6d::Zero();   ///< at the stamp; rows are moved by it
-  std::optional<Vector6d> mean{};         ///< velocity over the interval before; none if unknown
-  std::optional<Vector6d> mean_before{};  ///< velocity over the interval before that one
-  double dt = 0.0;                        ///< s, of the interval before
+  double readout = 0.0;                            ///< s, see RollingShutter
+  Vector6d velocity = Vector6d::Zero();            ///< at the stamp; rows are moved by it
+  std::optional<Vector6d> mean_velocity{};         ///< over the interval before; none if unknown
+  std::optional<Vector6d> mean_velocity_before{};  ///< over the interval before that one
+  double dt = 0.0;                                 ///< s, of the interval before
   std::optional<RateByRows> rate_by_rows{};
 
   /// Keeps the features only: no velocity is measured.
-  void forgetMotion() { mean.reset(), mean_before.reset(), rate_by_rows.reset(); }
+  void forgetMotion() { mean_velocity.reset(), mean_velocity_before.reset(), rate_by_rows.reset(); }
 };
 
 /// Compensation of a rolling shutter. Its rows are taken one after the other: the middle one at the stamp, left and
