@@ -21,7 +21,7 @@ namespace sdvo {
 /// are the instrument (Wright 1928).
 class RowReadout {
  public:
-  /// s; a readout of 3 ms causes position errors of 5 sigma.
+  /// s; a readout of 3 ms causes position errors of 5 standard deviations of the published covariance.
   static constexpr double kWarn = 0.003;
 
   struct Estimate {
