@@ -77,7 +77,7 @@ STAGES = {
     "… matches, search, alignment": ["MotionSearch::find"],
     "… window": ["LocalMap::adjust"],
     "… … its covariances": ["WindowOptimizer::Solver::covariances"],
-    "… rig": ["LearntRig::learn", "LearntRig::shownRotation", "RightCameraDelay::learn"],
+    "… rig": ["LearntRig::learn", "LearntRig::rotationHypothesis", "RightCameraDelay::learn"],
 }
 
 

@@ -28,7 +28,8 @@ std::string rivalWords(const MotionScene& scene, const MotionHypothesis& found) 
   return words.str();
 }
 
-/// Log of the odds less those without evidence: these are in logOddsWrong(), and each evidence would add them again.
+/// Log of the odds beyond exp(kUnsuspected). logOddsWrong() counts the odds without evidence once; each evidence would
+/// count them again.
 double logExcess(double log_odds) {
   return std::log(std::exp(log_odds) - std::exp(kUnsuspected));
 }
@@ -53,23 +54,24 @@ void Doubt::raise(const std::vector<Evidence>& evidence) {
 }
 
 void Doubt::fade() {
-  // Pairs: half of the time in which new points become lasting ones, and new evidence.
+  // Pairs: half of kLastingSightings, after which points that began in the doubt are lasting, and new evidence.
   constexpr double kHalfLife = 0.5 * MotionHypothesis::kLastingSightings;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
   if (!lasts()) distance_ = angle_ = largest_ = 0.0;
 }
 
-/// Alternatives to the motion, its rivals first. `deviation`: second moment of its error if it is wrong.
-MotionMixture Doubt::alternatives(const MotionScene& scene, const MotionHypothesis& found,
-                                  const std::vector<Evidence>& evidence, const Matrix6d& deviation) const {
-  const double rivals = std::min(-sdvo::logOdds(found.probability), kCertain);
-  MotionMixture mixture;
-  mixture.add({rivals, Matrix6d::Zero(), rivalWords(scene, found)});  // their moment is found.rivals_moment
-  mixture.add({logOddsWrong(found), deviation, innovationWords(found) + ": followed is something else"});
+/// `deviation`: second moment of the motion's error if it is wrong.
+Doubt::Alternatives Doubt::alternatives(const MotionScene& scene, const MotionHypothesis& found,
+                                        const std::vector<Evidence>& evidence, const Matrix6d& deviation) const {
+  Alternatives result{{}, std::min(-sdvo::logOdds(found.probability), kCertain), logOddsWrong(found)};
+  MotionMixture& mixture = result.mixture;
+  // The moment of the rivals is found.rivals_moment.
+  mixture.add({result.log_odds_rivals, Matrix6d::Zero(), rivalWords(scene, found)});
+  mixture.add({result.log_odds_wrong, deviation, innovationWords(found) + ": followed is something else"});
   for (const Evidence& each : evidence)
     if (each.log_odds > kUnsuspected) mixture.add({logExcess(each.log_odds), deviation, each.cause});
   mixture.add({log_odds_, deviation, "a moment ago " + cause_});
-  return mixture;
+  return result;
 }
 
 Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
@@ -80,8 +82,7 @@ Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, co
   const ExpectedMotion expected = scene.prior.empty() ? ExpectedMotion() : scene.prior.front();
   const Vector6d innovation = expected.innovation(found.motion.T_current_reference.inverse());
   const Matrix6d deviation = momentOf(innovation) + expected.covariance;
-  const MotionMixture mixture = alternatives(scene, found, evidence, deviation);
-  const MotionMixture::Alternative &rivals = mixture.alternatives()[0], &wrong = mixture.alternatives()[1];
+  const auto [mixture, log_odds_rivals, log_odds_wrong] = alternatives(scene, found, evidence, deviation);
   Belief belief;
   belief.probability = mixture.probability();
   belief.moment = mixture.moment();
@@ -91,15 +92,15 @@ Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, co
 
   // The pair's evidence is carried to the next ones.
   raise(evidence);
-  raise(std::exp(rivals.log_odds) + std::exp(wrong.log_odds),
-        !found.rival || rivals.log_odds < wrong.log_odds ? "the motion changed faster than a vehicle's can"
+  raise(std::exp(log_odds_rivals) + std::exp(log_odds_wrong),
+        !found.rival || log_odds_rivals < log_odds_wrong ? "the motion changed faster than a vehicle's can"
         : found.rival->is_torn                           ? "the images seemed to be torn or damaged"
                                                          : "something else moved in view");
 
   // Errors of successive motions that follow one mover add up in the pose.
   double distance = distance_ + std::sqrt(deviation.topLeftCorner<3, 3>().trace() / 3.0);
   double angle = angle_ + std::sqrt(deviation.bottomRightCorner<3, 3>().trace() / 3.0);
-  const double wrong_without_rivals = 1.0 - belief.probability - mixture.probability(rivals);
+  const double wrong_without_rivals = 1.0 - belief.probability - mixture.probability(log_odds_rivals);
   belief.pose_moment = wrong_without_rivals * isotropic(distance * distance, angle * angle);
   if (lasts()) distance_ = distance, angle_ = angle;
   return belief;

@@ -26,9 +26,10 @@ struct Evidence {
 /// Posterior of a pair's motion.
 struct Belief {
   double probability = 1.0;  ///< that the motion is the camera's
-  /// Second moment (m and rad) of the motion's error if it is not the camera's, times the probability of that. The
-  /// pose's moment has the sum of the errors since the doubt began.
-  Matrix6d moment = Matrix6d::Zero(), pose_moment = Matrix6d::Zero();
+  /// Second moment of the motion's error over all alternatives but the rivals, which have `rivals_moment`, m and rad.
+  Matrix6d moment = Matrix6d::Zero();
+  /// The same of the pose: errors since the doubt began add up.
+  Matrix6d pose_moment = Matrix6d::Zero();
   std::string reason;  ///< names the likeliest alternative
 };
 
@@ -48,9 +49,16 @@ class Doubt {
   void fade();
 
  private:
+  /// Alternatives to a measured motion, and the log-odds of two of them.
+  struct Alternatives {
+    MotionMixture mixture;
+    double log_odds_rivals;  ///< that one of its rivals is the camera's motion
+    double log_odds_wrong;   ///< that it is wrong by its prior and lasting points, without a rival
+  };
+
   void raise(double odds, const std::string& cause);
-  MotionMixture alternatives(const MotionScene& scene, const MotionHypothesis& found,
-                             const std::vector<Evidence>& evidence, const Matrix6d& deviation) const;
+  Alternatives alternatives(const MotionScene& scene, const MotionHypothesis& found,
+                            const std::vector<Evidence>& evidence, const Matrix6d& deviation) const;
 
   double log_odds_ = kUnsuspected;
   std::string cause_;                    ///< that with the largest odds since the doubt began

@@ -79,7 +79,7 @@ bool isObject(const Points& points, const Points& others) {
 /// Whether a row of the image separates points from others, as in a torn or damaged image. Their numbers do not imply
 /// which part shows the camera's motion.
 bool areDivided(const Points& points, const Points& others) {
-  constexpr double kAstray = 0.1;  // of either side (chosen): some wrong matches agree by chance
+  constexpr double kWrongInliers = 0.1;  // of either side (chosen): some wrong matches agree by chance
   const auto rowsOf = [](const Points& pixels) {
     std::vector<double> rows;
     for (const Eigen::Vector2d& part : byParts(pixels)) rows.push_back(part.y());
@@ -89,8 +89,8 @@ bool areDivided(const Points& points, const Points& others) {
   const double all = static_cast<double>(rows.size() + other_rows.size());
   const double larger = static_cast<double>(std::max(rows.size(), other_rows.size()));
   if (std::pow(larger / all, all) >= kTailProbability) return false;
-  return quantile(rows, 1.0 - kAstray) <= quantile(other_rows, kAstray) ||
-         quantile(other_rows, 1.0 - kAstray) <= quantile(rows, kAstray);
+  return quantile(rows, 1.0 - kWrongInliers) <= quantile(other_rows, kWrongInliers) ||
+         quantile(other_rows, 1.0 - kWrongInliers) <= quantile(rows, kWrongInliers);
 }
 
 /// The matches that each hypothesis of a pair explains, among the matches of all hypotheses.
@@ -141,17 +141,18 @@ class Explanations {
     return areDivided(of_a, only_b) || areDivided(of_b, only_a);
   }
 
-  /// The one whose strongest rival is the weakest: pairwise ratios compare different points, so no order may exist.
+  /// Minimax: the hypothesis whose largest log-odds against it are smallest. Pairwise ratios compare different points,
+  /// so they need not be transitive.
   std::size_t likeliest() const {
     const std::size_t count = hypotheses_.size();
-    std::vector<double> strongest(count, -std::numeric_limits<double>::infinity());
+    std::vector<double> against(count, -std::numeric_limits<double>::infinity());
     for (std::size_t a = 0; a < count; ++a)
       for (std::size_t b = 0; b < a; ++b) {
         const double ratio = logRatio(a, b);
-        strongest[a] = std::max(strongest[a], -ratio);
-        strongest[b] = std::max(strongest[b], ratio);
+        against[a] = std::max(against[a], -ratio);
+        against[b] = std::max(against[b], ratio);
       }
-    return static_cast<std::size_t>(std::min_element(strongest.begin(), strongest.end()) - strongest.begin());
+    return static_cast<std::size_t>(std::min_element(against.begin(), against.end()) - against.begin());
   }
 
  private:
@@ -187,12 +188,13 @@ class Explanations {
 /// A motion of features that the chosen one does not explain, more than chance gives.
 struct RivalMotion {
   std::size_t hypothesis;
-  double log_ratio;           ///< log-odds against the chosen one
+  double log_ratio;           ///< log-odds against the likeliest hypothesis
   std::vector<int> features;  ///< of the pair, explained by it alone
   bool is_torn;               ///< a row of the image separates both
 };
 
-/// Rivals of the chosen motion, each once. `likeliest` and `chosen` are estimates of one motion.
+/// Rivals of the chosen motion, each once. `chosen` is the estimate of the motion of `likeliest` with the most inliers.
+/// Log-odds are against `likeliest`; inliers are those of `chosen`.
 std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypothesis>& hypotheses,
                                   const Explanations& explanations, std::size_t likeliest, std::size_t chosen) {
   const std::vector<int> own = sorted(hypotheses[chosen].inlierFeatures());
@@ -231,10 +233,9 @@ void compareWithRivals(const MotionScene& scene, const std::vector<MotionHypothe
   chosen.probability = mixture.probability();
   chosen.rivals_moment = mixture.moment();
   std::vector<int> explained;
-  for (std::size_t k = 0; k < rivals.size(); ++k) {
-    const RivalMotion& rival = rivals[k];
+  for (const RivalMotion& rival : rivals) {
     explained.insert(explained.end(), rival.features.begin(), rival.features.end());
-    const double probability = mixture.probability(mixture.alternatives()[k]);
+    const double probability = mixture.probability(rival.log_ratio);
     if (isTolerable(scene, chosen.motion.T_current_reference,
                     chosen.motion.T_current_reference * motionOf(rival).inverse()))
       chosen.probability += probability;
@@ -358,9 +359,9 @@ bool agree(const StereoCamera& camera, const std::vector<Correspondence>& corres
   return 2 * static_cast<std::size_t>(same) > points.size();
 }
 
-double logLikelihood(double unexplained, int points) {
+double logLikelihood(double unexplained_sightings, int points) {
   if (points == 0) return 0.0;
-  return -effectiveNumber(points) * kLogOddsOfSighting * unexplained / points;
+  return -effectiveNumber(points) * kLogOddsOfSighting * unexplained_sightings / points;
 }
 
 double logAgreement(const Agreement& agreement) {

@@ -27,8 +27,8 @@ struct Agreement {
   int sightings = 0, inlier_sightings = 0;  ///< confirmed sightings of their points, each four at most
 };
 
-/// Log-odds that a measured motion is wrong: another thing's than the camera's. Without any evidence (probability of
-/// 0.001, chosen), and after an event that leaves a wrong map or rig: as likely as a right motion is without evidence.
+/// kUnsuspected: log-odds that a motion is not the camera's, without any evidence (probability of 0.001, chosen).
+/// kCertain: the same after an event that leaves a wrong map or rig.
 constexpr double kUnsuspected = -6.9, kCertain = -kUnsuspected;
 
 /// Probabilities as log-odds: log(p / (1 - p)).
@@ -53,8 +53,8 @@ struct MotionScene {
   std::optional<Eigen::Isometry3d> T_current_reference;  ///< predicted; reference: the map's newest pair
   std::optional<Eigen::Isometry3d> guess;                ///< the same from another source than images
   std::vector<ExpectedMotion> prior;  ///< mixture for T_reference_current; empty: all motions are equally likely
-  bool is_suspected = false;          ///< carried doubt lasts: all hypotheses compete
-  bool is_doubted = false;            ///< … and makes pairs doubtful: the search radius is wide at once
+  bool all_compete = false;           ///< an earlier doubt lasts: all hypotheses compete
+  bool searches_wide = false;         ///< the doubt makes pairs doubtful: search at once in the wide radius
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
   Noise noise{NoiseOptions()};
   std::optional<PlaceBelief> place{};  ///< where the map was recognised after an outage
@@ -82,8 +82,8 @@ struct MotionHypothesis {
   };
   std::optional<Rival> rival;
   Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad
-  /// Squared Mahalanobis distance, for independent points, between the motion of the lasting inliers and that of all;
-  /// none if it is significant.
+  /// Input of Noise::learnShared(): squared Mahalanobis distance, for independent points, between the motion of the
+  /// lasting inliers and that of all. None if it is significant: the lasting points' motion is then taken.
   std::optional<double> lasting_square;
 
   /// Confirmed sightings of a match's point, four at most.
@@ -142,9 +142,9 @@ double chanceOfAgreement(double threshold, double gate);
 bool agree(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
            const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within);
 
-/// Log-likelihood, up to a constant, of a motion that does not explain some of the `points`. `unexplained`: the sum of
-/// their confirmed sightings. Points of one mover have correlated errors, so their effective number scales the sum.
-double logLikelihood(double unexplained, int points);
+/// Log-likelihood, up to a constant, that the camera's motion leaves so many confirmed sightings of the `points`
+/// unexplained. Points of one mover have correlated errors: they count as effectiveNumber(points).
+double logLikelihood(double unexplained_sightings, int points);
 
 /// Log-likelihood ratio of the lasting points' agreement: under the camera's motion, against a mover's.
 double logAgreement(const Agreement& agreement);

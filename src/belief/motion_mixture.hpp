@@ -24,19 +24,16 @@ class MotionMixture {
 
   /// That the motion is the camera's.
   double probability() const { return std::exp(-largest()) / total(); }
-  /// That an alternative is right.
-  double probability(const Alternative& alternative) const {
-    return std::exp(alternative.log_odds - largest()) / total();
-  }
+  /// That an alternative of these log-odds is right.
+  double probability(double log_odds) const { return std::exp(log_odds - largest()) / total(); }
 
   /// Second moment of the motion's error, m and rad.
   Matrix6d moment() const {
     Matrix6d sum = Matrix6d::Zero();
-    for (const Alternative& alternative : alternatives_) sum += probability(alternative) * alternative.moment;
+    for (const Alternative& alternative : alternatives_) sum += probability(alternative.log_odds) * alternative.moment;
     return sum;
   }
 
-  const std::vector<Alternative>& alternatives() const { return alternatives_; }
   /// Of the likeliest alternative; empty without one.
   std::string cause() const { return alternatives_.empty() ? "" : likeliest().cause; }
   /// The likeliest of at least one alternative.

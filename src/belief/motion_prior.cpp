@@ -33,26 +33,27 @@ Matrix6d MotionPrior::stampNoise(const Vector6d& velocity) const {
 
 void MotionPrior::noteInterval(double dt) {
   constexpr double kMean = 1.0 / (1.0 - kUsualMemory);  // intervals
-  intervals_ = std::min(intervals_ + 1.0, kMean);
-  mean_interval_ += (dt - mean_interval_) / intervals_;
-  interval_ = std::max(dt, kUsualMemory * interval_);
+  counted_intervals_ = std::min(counted_intervals_ + 1.0, kMean);
+  mean_interval_ += (dt - mean_interval_) / counted_intervals_;
+  longest_interval_ = std::max(dt, kUsualMemory * longest_interval_);
 }
 
 double MotionPrior::interval(double dt, const Eigen::Isometry3d& motion) const {
   constexpr double kBurst = 0.2;  // ratio of the mean interval (chosen): a camera does not change its rate by as much
-  return std::max({dt < kBurst * mean_interval_ ? interval_ : dt, motion.translation().norm() / options_.max_speed,
+  return std::max({dt < kBurst * mean_interval_ ? longest_interval_ : dt,
+                   motion.translation().norm() / options_.max_speed,
                    logSO3(motion.linear()).norm() / options_.max_rotation_rate});
 }
 
 ExpectedMotion MotionPrior::predicted(double dt) const {
   // Stamps of a burst are closer together than the moments at which its pairs were taken.
-  const double time = std::max(dt, interval_);
+  const double time = std::max(dt, longest_interval_);
   const Vector6d missed = *velocity_ * (time - dt);
   return {expSE3(*velocity_ * dt), processNoise(time, velocity_interval_, 0.0) + missed * missed.transpose() +
                                        time * time * velocity_covariance_ + doubt_};
 }
 
-std::optional<ExpectedMotion> MotionPrior::confirmed(std::int64_t stamp, double dt) const {
+std::optional<ExpectedMotion> MotionPrior::priorByConfirmed(std::int64_t stamp, double dt) const {
   if (!confirmed_) return std::nullopt;
   const double age = static_cast<double>(stamp - confirmed_stamp_) * 1e-9, stamps = 2.0 * options_.stamp_sigma;
   const ExpectedMotion expected{expSE3(*confirmed_ * dt), processNoise(dt + stamps, confirmed_interval_ + stamps, age) +
@@ -68,16 +69,19 @@ ExpectedMotion MotionPrior::around(const Eigen::Isometry3d& motion, double dt) c
 }
 
 double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const {
-  if (!velocity_ || !before_) return 0.0;
+  if (!velocity_ || !previous_velocity_) return 0.0;
+  // In the right order the velocities are before, velocity, now. In the wrong one: before, `swapped_first` (the last
+  // motion and this one, which leads back), -now.
   const Vector6d second = logSE3(motion), now = second / dt;
-  const Vector6d first = *velocity_ + second / velocity_interval_;
+  const Vector6d swapped_first = *velocity_ + second / velocity_interval_;
   const Matrix6d measured = 2.0 * dt * dt * velocity_covariance_;  // of two motions
   // Of a change of the velocity, bounded by the probability that the prior is wrong.
   const auto cost = [&](const Vector6d& from, const Vector6d& to) {
     const double square = around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), measured);
     return std::min(0.5 * square, -std::log(kTailProbability));
   };
-  return cost(*before_, *velocity_) + cost(*velocity_, now) - cost(*before_, first) - cost(first, -now);
+  const Vector6d& before = *previous_velocity_;
+  return cost(before, *velocity_) + cost(*velocity_, now) - cost(before, swapped_first) - cost(swapped_first, -now);
 }
 
 Matrix6d MotionPrior::outageCovariance(double seconds) const {
@@ -125,7 +129,7 @@ void MotionPrior::takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& moti
   // The error of stamps may make a motion too fast, but such a velocity predicts no other motion.
   if (!(velocity.head<3>().norm() <= options_.max_speed) || !(velocity.tail<3>().norm() <= options_.max_rotation_rate))
     return;
-  before_ = std::exchange(velocity_, velocity);
+  previous_velocity_ = std::exchange(velocity_, velocity);
   velocity_interval_ = dt;
   velocity_covariance_ = covariance / (dt * dt);
   if (!is_confirmed && confirmed_) return;

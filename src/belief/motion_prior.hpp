@@ -49,13 +49,13 @@ class MotionPrior {
 
   /// Prior of the motion over `dt` s after `stamp`, ns, by the confirmed velocity. None without one, or if it is so old
   /// that its error exceeds the distance at max_speed over max_gap.
-  std::optional<ExpectedMotion> confirmed(std::int64_t stamp, double dt) const;
+  std::optional<ExpectedMotion> priorByConfirmed(std::int64_t stamp, double dt) const;
 
   /// Distribution around another source's motion over `dt` s, with the process noise of a prediction over one pair.
   ExpectedMotion around(const Eigen::Isometry3d& motion, double dt) const;
 
   /// Log-likelihood ratio that two pairs came in the wrong order, from the last motion and this one, over `dt` s. In
-  /// wrong order the first motion spans both intervals, and the second one leads back.
+  /// wrong order the last motion skips a pair, and this one leads back to it.
   double logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const;
 
   /// Covariance, m^2 and rad^2, of the motion over so many seconds without images; its mean is standstill. It starts at
@@ -79,7 +79,7 @@ class MotionPrior {
                     bool is_confirmed, const Matrix6d& doubt);
 
   /// The next pair does not continue the last one: no motion is predicted. The confirmed velocity stays.
-  void interrupt() { velocity_.reset(), before_.reset(), doubt_.setZero(); }
+  void interrupt() { velocity_.reset(), previous_velocity_.reset(), doubt_.setZero(); }
 
  private:
   /// Covariance, m^2 and rad^2, of a motion over `dt` s under white acceleration. Its prediction is a mean velocity
@@ -88,16 +88,18 @@ class MotionPrior {
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
   MotionPriorOptions options_;
-  std::optional<Vector6d> velocity_, before_, confirmed_;  ///< m/s and rad/s; `before_`: the last but one
+  std::optional<Vector6d> velocity_, previous_velocity_, confirmed_;  ///< m/s and rad/s
   Matrix6d velocity_covariance_ = Matrix6d::Zero(), confirmed_covariance_ = Matrix6d::Zero();
   Matrix6d doubt_ = Matrix6d::Zero();                          ///< see takeVelocity(): m and rad
   std::int64_t confirmed_stamp_ = 0;                           ///< ns
   double velocity_interval_ = 0.0, confirmed_interval_ = 0.0;  ///< s, over which the velocities were measured
-  double interval_ = 0.0;                                      ///< s: decaying maximum of the intervals
-  double mean_interval_ = 0.0, intervals_ = 0.0;               ///< mean of the last intervals, s; their number
+  double longest_interval_ = 0.0;                              ///< s, decaying maximum of the intervals
+  double mean_interval_ = 0.0;                                 ///< s, running mean
+  double counted_intervals_ = 0.0;                             ///< number of intervals in the mean, bounded
 };
 
-/// Second moment of a difference between motions, equal in every direction of translation and of rotation.
+/// Second moment of a difference between motions. Each direction of translation, and of rotation, gets the whole
+/// squared length: an upper bound.
 Matrix6d momentOf(const Vector6d& difference);
 
 }  // namespace sdvo

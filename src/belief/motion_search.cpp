@@ -17,14 +17,14 @@
 namespace sdvo {
 namespace {
 
-/// Whether the motion's inliers end at a row of the image and a good part of the matches beyond it are outliers: the
+/// Whether the motion's inliers end at a row of the image, and significantly many matches beyond it are outliers: the
 /// image may be torn there.
 bool endsAtRow(const MotionHypothesis& found) {
-  constexpr double kAstray = 0.05;  // of the inliers (chosen): some wrong matches agree by chance
+  constexpr double kWrongInliers = 0.05;  // of the inliers (chosen): some wrong matches agree by chance
   const auto row = [&](int i) { return found.correspondences[static_cast<std::size_t>(i)].measurement.y(); };
   std::vector<double> rows;
   for (const int i : found.motion.inliers) rows.push_back(row(i));
-  const double first = quantile(rows, kAstray), last = quantile(rows, 1.0 - kAstray);
+  const double first = quantile(rows, kWrongInliers), last = quantile(rows, 1.0 - kWrongInliers);
   std::vector<int> above, below;
   for (int i = 0; i < static_cast<int>(found.correspondences.size()); ++i) {
     if (row(i) < first) above.push_back(i);
@@ -33,9 +33,9 @@ bool endsAtRow(const MotionHypothesis& found) {
   const std::vector<int>& beyond = above.size() > below.size() ? above : below;
   const auto outliers = static_cast<int>(without(beyond, found.motion.inliers).size());
   const double matches = static_cast<double>(found.correspondences.size());
-  const double share = 1.0 - static_cast<double>(rows.size()) / matches;
+  const double outlier_ratio = 1.0 - static_cast<double>(rows.size()) / matches;
   return outliers > kSignificantRatio * matches &&
-         binomialTail(static_cast<int>(beyond.size()), outliers, share) < kTailProbability;
+         binomialTail(static_cast<int>(beyond.size()), outliers, outlier_ratio) < kTailProbability;
 }
 
 }  // namespace
@@ -55,15 +55,15 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   const double view_time = stopwatch.lap();
   MotionHypothesis found = searchNear(scene, view, expected, max_doubt);
   found.match_time += view_time;
-  const bool needs_rivals = scene.is_suspected || !isBeyondDoubt(found, max_doubt);
+  const bool needs_rivals = scene.all_compete || !isBeyondDoubt(found, max_doubt);
   if (!needs_rivals && refineByPatches(scene, false, found)) return found;
   found = chooseMotion(scene, options(scene).inlier_threshold, compete(scene, view, std::move(found)));
   if (found.motion.success) refineByPatches(scene, true, found);
   return found;
 }
 
-/// Refines the motion on aligned patches, and keeps to the lasting points' own motion if that differs. Unless it
-/// `may_change` beyond tolerance, returns false in that case and leaves the motion.
+/// Refines the motion on aligned patches, and takes motionOfLasting() if there is one. Without `may_change` a change
+/// beyond tolerance is not made: returns false and leaves the motion.
 bool MotionSearch::refineByPatches(const MotionScene& scene, bool may_change, MotionHypothesis& found) const {
   Stopwatch stopwatch;
   Alignment aligned = align(scene, found);
@@ -73,7 +73,7 @@ bool MotionSearch::refineByPatches(const MotionScene& scene, bool may_change, Mo
   if (changes && !may_change) return false;
   found.motion.T_current_reference = aligned.T_current_reference;
   found.sightings = std::move(aligned.sightings);
-  if (T_lasting) keepTo(scene, *T_lasting, aligned.measured, found);
+  if (T_lasting) dropInliersOff(scene, *T_lasting, aligned.measured, found);
   return true;
 }
 
@@ -129,7 +129,7 @@ MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPt
                                           double max_doubt) const {
   if (!T_current_reference || !matcher_.options().gating) return search(matcher_, scene, view, T_current_reference);
   double match_time = 0.0, motion_time = 0.0;
-  if (!scene.is_doubted) {
+  if (!scene.searches_wide) {
     MotionHypothesis found = search(matcher_, scene, view, T_current_reference);
     if (isBeyondDoubt(found, max_doubt) && !leavesGate(scene, *T_current_reference, found)) return found;
     match_time = found.match_time, motion_time = found.motion_time;
@@ -248,8 +248,8 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
   return alignment;
 }
 
-/// The lasting points' own motion, if its difference from that of all inliers is likelier a mover's than noise. A
-/// mover's difference has the prior's covariance, in a rigid world it has the noise of this rig.
+/// Motion of the lasting points, if its difference from the motion of all inliers is more likely a mover's (prior's
+/// covariance) than this rig's noise. Else sets lasting_square, if both were compared.
 std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene& scene, const Alignment& aligned,
                                                                MotionHypothesis& found) const {
   const StereoCamera& camera = scene.features.camera;
@@ -265,10 +265,10 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
   const Vector6d difference = logSE3(T_lasting * T.inverse());
   // Lasting points are a part of all, so the covariance of the difference is the part's less that of all (Hausman
   // 1978). With the others' information O its inverse is H + H O^-1 H.
-  MotionEstimatorOptions at_once = options(scene);
-  at_once.refinement_iterations = 0;
+  MotionEstimatorOptions without_steps = options(scene);
+  without_steps.refinement_iterations = 0;
   Eigen::Isometry3d T_all = T;
-  const Matrix6d of_others = refineMotion(camera, at_once, others, T_all).hessian;
+  const Matrix6d of_others = refineMotion(camera, without_steps, others, T_all).hessian;
   const Matrix6d of_lasting = equations.hessian;
   const Matrix6d information = (of_lasting + of_lasting * of_others.ldlt().solve(of_lasting)) / equations.variance();
   const double log_factor =
@@ -278,10 +278,10 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
   return std::nullopt;
 }
 
-/// Keeps the inliers whose aligned positions fit the lasting points' motion. A mover slower than corner noise is an
-/// inlier of every hypothesis and biases it.
-void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
-                          const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
+/// Takes the lasting points' motion, and drops the inliers whose aligned positions do not fit it. A mover slower than
+/// corner noise is an inlier of every hypothesis and biases it.
+void MotionSearch::dropInliersOff(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
+                                  const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
   const std::vector<int> kept =
       PoseProblem(scene.features.camera, measured, scene.noise.alignedGate()).inliers(T_lasting);
   std::vector<int> inliers, dropped;

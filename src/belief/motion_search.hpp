@@ -60,8 +60,8 @@ class MotionSearch {
   Alignment align(const MotionScene& scene, const MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> motionOfLasting(const MotionScene& scene, const Alignment& aligned,
                                                    MotionHypothesis& found) const;
-  void keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting, const std::vector<Correspondence>& measured,
-              MotionHypothesis& found) const;
+  void dropInliersOff(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
+                      const std::vector<Correspondence>& measured, MotionHypothesis& found) const;
 
   MotionEstimatorOptions motion_options_;
   PatchAlignmentOptions alignment_options_;

@@ -59,12 +59,11 @@ Matrix6d PoseCovariance::updateExposure(const RigEstimate::MotionJacobian& since
 
 void PoseCovariance::walkRig(const RigEstimate& known, const RigEstimate::Matrix& step) {
   if (step.isZero()) return;  // what is certain of the rig has no inverse then
-  regress(known, known.covariance * (known.covariance + step).inverse());
+  expressByNewRig(known, known.covariance * (known.covariance + step).inverse());
 }
 
-/// Expresses poses by the rig after a step. The rig before it is known.mean + kept * (rig - known.mean), and a
-/// remainder that is independent of the rig.
-void PoseCovariance::regress(const RigEstimate& known, const RigEstimate::Matrix& kept) {
+/// The old rig is known.mean + kept * (new rig - known.mean), and a remainder that is independent of the new one.
+void PoseCovariance::expressByNewRig(const RigEstimate& known, const RigEstimate::Matrix& kept) {
   const RigEstimate::Matrix gone = RigEstimate::Matrix::Identity() - kept;
   const auto express = [&](Exposure& exposure, Matrix6d& covariance) {
     const RigEstimate::MotionJacobian derivative = exposure.leftCols<RigEstimate::kParameters>();
@@ -82,9 +81,9 @@ void PoseCovariance::coverCorrection(const Vector6d& correction) {
 }
 
 void PoseCovariance::beginMap() {
-  measured_ += doubted_;
-  doubted_.setZero();
-  unmeasured_.setZero();
+  measured_ += pose_doubt_;
+  pose_doubt_.setZero();
+  motion_doubt_.setZero();
   markKeyframe();
 }
 
@@ -95,7 +94,7 @@ void PoseCovariance::markKeyframe() {
 }
 
 void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
-  for (Matrix6d* covariance : {&measured_, &keyframe_, &doubted_, &unmeasured_})
+  for (Matrix6d* covariance : {&measured_, &keyframe_, &pose_doubt_, &motion_doubt_})
     *covariance = carriedBy(T_previous_current, *covariance);
   if (since_keyframe_) since_keyframe_ = carriedBy(T_previous_current, *since_keyframe_);
   for (Exposure* exposure : {&exposure_, &keyframe_exposure_})
@@ -111,17 +110,18 @@ Matrix6d PoseCovariance::update(const Eigen::Isometry3d& T_previous_current, con
                                 const Matrix6d& growth) {
   const Matrix6d before = measured_;
   carry(T_previous_current);
-  const Matrix6d motion = unmeasured_ + (since_keyframe_ ? covering(*since_keyframe_, since_keyframe) : since_keyframe);
+  const Matrix6d motion =
+      motion_doubt_ + (since_keyframe_ ? covering(*since_keyframe_, since_keyframe) : since_keyframe);
   since_keyframe_ = since_keyframe;
   measured_ = noLessThan(before, keyframe_ + growth);
-  doubted_.setZero();
-  unmeasured_.setZero();
+  pose_doubt_.setZero();
+  motion_doubt_.setZero();
   return motion;
 }
 
 void PoseCovariance::addDoubt(const Matrix6d& motion, const Matrix6d& pose) {
-  doubted_ += pose;
-  unmeasured_ += motion;
+  pose_doubt_ += pose;
+  motion_doubt_ += motion;
 }
 
 }  // namespace sdvo

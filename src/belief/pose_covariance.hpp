@@ -18,7 +18,8 @@ Matrix6d missingCovariance(const Matrix6d& covariance, const Vector6d& deviation
 /// It is the sum of a measured and an unmeasured part. The measured part is the key frame's covariance, and the growth
 /// of the pose's covariance in the map since. It grows from key frame to key frame, but not while the map stays the
 /// same; its traces of translation and rotation never shrink. Predictions and doubts since the last measurement are the
-/// unmeasured part, which the next measurement replaces. A sum of parts is positive whatever their size.
+/// unmeasured part, which the next measurement replaces. Parts are only added, so the covariance stays positive
+/// semidefinite.
 ///
 /// The rig's error is common to all motions: unlike noise it adds up with the distance. Pose and rig are one Gaussian
 /// with a cross-covariance (Schmidt 1966: the pose considers what it cannot observe), kept as the rig's distribution,
@@ -27,7 +28,7 @@ Matrix6d missingCovariance(const Matrix6d& covariance, const Vector6d& deviation
 class PoseCovariance {
  public:
   /// Of the last pose without the rig's error; zero in the beginning.
-  Matrix6d value() const { return measured_ + doubted_; }
+  Matrix6d value() const { return measured_ + pose_doubt_; }
 
   /// Second moment of the last pose's error by the rig: the covariance of `known`, and its distance from what was
   /// compensated on the way.
@@ -57,10 +58,10 @@ class PoseCovariance {
 
   /// The pose moved and was measured against the key frame with the covariance `since_keyframe`. `growth`: by how much
   /// its covariance in the map exceeds the key frame's. Returns the covariance of the motion between the two reported
-  /// poses. After a key frame, this is `since_keyframe`. Otherwise both poses share the key frame's noise, which
-  /// cancels in the motion. It is as large as the better pose's own noise, because the points were seen as often. The
-  /// sum of both poses' own noise is then the larger covariance since the key frame. Predictions and doubts of the
-  /// previous pose are added.
+  /// poses. After a key frame, this is `since_keyframe`. Otherwise both poses have their own noise, A and B, and share
+  /// the key frame's noise K, which cancels in the motion. All saw the points equally often, so K is as large as the
+  /// smaller own noise, A. Hence A + B = K + B, the larger covariance since the key frame. Predictions and doubts of
+  /// the previous pose are added.
   Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
   /// The same in a map of one key frame.
   Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
@@ -76,7 +77,7 @@ class PoseCovariance {
   /// which correlates with the rig after it.
   void walkRig(const RigEstimate& known, const RigEstimate::Matrix& step);
   /// The rig is another one, independent of the one that was `known`.
-  void changeRig(const RigEstimate& known) { regress(known, RigEstimate::Matrix::Zero()); }
+  void changeRig(const RigEstimate& known) { expressByNewRig(known, RigEstimate::Matrix::Zero()); }
 
   /// Adds second moments of doubt to the last motion and pose, until the next pose is measured in the map.
   void addDoubt(const Matrix6d& motion, const Matrix6d& pose);
@@ -90,13 +91,14 @@ class PoseCovariance {
 
   static Matrix6d momentOf(const Exposure& exposure, const RigEstimate& known);
   void carry(const Eigen::Isometry3d& T_previous_current);
-  void regress(const RigEstimate& known, const RigEstimate::Matrix& kept);
+  /// `kept`: regression of the old rig on the new one.
+  void expressByNewRig(const RigEstimate& known, const RigEstimate::Matrix& kept);
 
-  Matrix6d measured_ = Matrix6d::Zero();    ///< of the last measured pose, in the last pose's frame
-  Matrix6d doubted_ = Matrix6d::Zero();     ///< of the pose by predictions and doubts since then
-  Matrix6d keyframe_ = Matrix6d::Zero();    ///< of the key frame, in the last pose's frame
-  std::optional<Matrix6d> since_keyframe_;  ///< of the last measured motion; none at the key frame
-  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of the motion since the last measured pose
+  Matrix6d measured_ = Matrix6d::Zero();      ///< of the last measured pose, in the last pose's frame
+  Matrix6d pose_doubt_ = Matrix6d::Zero();    ///< of the pose by predictions and doubts since then
+  Matrix6d keyframe_ = Matrix6d::Zero();      ///< of the key frame, in the last pose's frame
+  std::optional<Matrix6d> since_keyframe_;    ///< of the last measured motion; none at the key frame
+  Matrix6d motion_doubt_ = Matrix6d::Zero();  ///< of the motion since the last measured pose
   Exposure exposure_ = Exposure::Zero();
   Exposure keyframe_exposure_ = Exposure::Zero();  ///< in the last pose's frame
 };

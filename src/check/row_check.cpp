@@ -9,11 +9,6 @@
 #include "../front_end/block_search.hpp"
 
 namespace sdvo {
-namespace {
-
-constexpr std::size_t kCells = RowDelay::kParts;
-
-}  // namespace
 
 void RowCheck::add(const CornerPair& pair) {
   corners_ += static_cast<int>(pair.corners.size());
@@ -33,9 +28,9 @@ void RowCheck::add(const CornerPair& pair) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     constexpr double kBlock = 1.5;  // px: a block is found to a pixel (chosen)
     if (!refined[i] || !followed[i] || distance(in_right[i], blocks[i]) > kBlock) continue;
-    const int cell = RowDelay::cellOf(points[i].x, points[i].y, pair.left.cols, pair.left.rows);
+    const int part = RowDelay::partOf(points[i].x, points[i].y, pair.left.cols, pair.left.rows);
     const double velocity = static_cast<double>(points[i].y - in_before[i].y) / pair.dt;
-    rows.push_back({cell, static_cast<double>(in_right[i].y - points[i].y), velocity, velocity,
+    rows.push_back({part, static_cast<double>(in_right[i].y - points[i].y), velocity, velocity,
                     static_cast<double>(points[i].x - in_right[i].x)});
   }
   samples_.insert(samples_.end(), rows.begin(), rows.end());
@@ -45,13 +40,13 @@ void RowCheck::add(const CornerPair& pair) {
 cv::Mat RowCheck::map() const {
   constexpr std::size_t kEnough = 10;
   const auto found = delay_.estimate();
-  const double late = found ? found->proved() : 0.0;
-  std::vector<std::vector<double>> cells(kCells);
+  const double late = found ? found->significantValue() : 0.0;
+  std::vector<std::vector<double>> parts(RowDelay::kParts);
   for (const RowDelay::Sample& sample : samples_)
-    cells[static_cast<std::size_t>(sample.cell)].push_back(sample.dv - late * sample.velocity);
+    parts[static_cast<std::size_t>(sample.part)].push_back(sample.dv - late * sample.velocity);
   cv::Mat map(RowDelay::kRows, RowDelay::kColumns, CV_64F, cv::Scalar(std::numeric_limits<double>::quiet_NaN()));
-  for (std::size_t cell = 0; cell < kCells; ++cell)
-    if (cells[cell].size() >= kEnough) map.at<double>(static_cast<int>(cell)) = median(cells[cell]);
+  for (std::size_t part = 0; part < RowDelay::kParts; ++part)
+    if (parts[part].size() >= kEnough) map.at<double>(static_cast<int>(part)) = median(parts[part]);
   return map;
 }
 
@@ -66,7 +61,7 @@ Finding RowCheck::rectification() const {
     square += dv * dv;
     worst = std::abs(dv) > std::abs(worst) ? dv : worst;
   }
-  if (4 * known < static_cast<int>(kCells)) {
+  if (4 * known < static_cast<int>(RowDelay::kParts)) {
     if (corners_ > 1000 && static_cast<int>(samples_.size()) < corners_ / 20)
       return {Verdict::kFail, text(0, "of ", corners_, " corners ", samples_.size(), " are found in the right image"),
               "left and right do not show the same scene: look at both"};
@@ -74,7 +69,7 @@ Finding RowCheck::rectification() const {
   }
   const double rms = std::sqrt(square / known);
   const std::string what = text(2, "rows differ by ", rms, " px (RMS over the image), ", worst, " at worst, in ", known,
-                                " of ", kCells, " parts");
+                                " of ", RowDelay::kParts, " parts");
   constexpr double kMuch = 0.45;  // of what features may have (chosen): KITTI 01, a reference, has 0.37
   return judged(10 * bad > known, rms > kMuch * max_dv_, what,
                 "raw images under the name of rectified ones? Else calibrate the pair again");
@@ -86,7 +81,7 @@ Finding RowCheck::sameMoment() const {
 }
 
 Finding checkMoment(const RowDelay::Estimate& right) {
-  const double late = std::abs(right.proved());
+  const double late = std::abs(right.significantValue());
   return judged(late > RowDelay::kFail, late > RowDelay::kWarn,
                 text(1, "right images are taken ", 1e3 * std::abs(right.value), " +- ", 1e3 * right.sigma, " ms ",
                      right.value > 0.0 ? "after" : "before", " left ones"),

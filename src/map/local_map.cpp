@@ -141,7 +141,7 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
 LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
                                    const Eigen::Isometry3d& T_camera_origin, int point, int feature) const {
   const NoiseOptions& noise = options_.noise;
-  const double sigma = options.canAlign(features.patch_layout.side) ? noise.unconfirmed() : noise.corner;
+  const double sigma = options.canAlign(features.patch_layout.side) ? noise.unconfirmedCorner() : noise.corner;
   Sighting sighting{{{features.u[feature], features.v[feature], features.disparity[feature]}, sigma}, point, feature};
   const Point& seen = points_[point];
   const auto found = seen.reference.findIn(options, features, feature, T_camera_origin, seen.position);

@@ -31,7 +31,7 @@ void reportMatches(const StereoFeatures& features, const std::vector<int>& given
 }
 
 void reportRig(const LearntRig& rig, OdometryResult& result) {
-  const RigEstimate known = rig.calibration.used();
+  const RigEstimate known = rig.calibration.compensated();
   if (rig.calibration.hasWindow()) {
     const RigEstimate::Vector sigma = known.covariance.diagonal().cwiseSqrt();
     if (rig.calibration.isEstimated()) {
@@ -61,13 +61,13 @@ OdometryState::OdometryState(const VisualOdometryOptions& options, int first_epo
 
 void OdometryState::forgetRig(const VisualOdometryOptions& options) {
   covariance.changeRig(rig.calibration.estimate());
-  if (left) left->covariance.changeRig(rig.calibration.estimate());
+  if (earlier) earlier->covariance.changeRig(rig.calibration.estimate());
   rig = unknownRig(options);
 }
 
 void OdometryState::walkRig(const RigEstimate& known, const RigEstimate::Matrix& step) {
   covariance.walkRig(known, step);
-  if (left) left->covariance.walkRig(known, step);
+  if (earlier) earlier->covariance.walkRig(known, step);
 }
 
 void OdometryState::interrupt() {
@@ -77,37 +77,37 @@ void OdometryState::interrupt() {
 
 void OdometryState::recover(const VisualOdometryOptions& options) {
   OdometryState fresh(options, epoch);
-  fresh.T_origin_camera = sound.T_origin_camera;
-  fresh.covariance.reset(sound.pose_covariance);
-  fresh.distance = sound.distance;
+  fresh.T_origin_camera = last_sound.T_origin_camera;
+  fresh.covariance.reset(last_sound.pose_covariance);
+  fresh.distance = last_sound.distance;
   fresh.camera = camera, fresh.lens = lens, fresh.last_stamp = last_stamp, fresh.last_pose_stamp = last_pose_stamp;
   fresh.pairs = pairs, fresh.started = started;
-  fresh.sound = std::move(sound);
+  fresh.last_sound = std::move(last_sound);
   *this = std::move(fresh);
 }
 
 void OdometryState::startAgain() {
-  if (map) left = LeftMap{std::move(*map), T_origin_camera, covariance, last_pose_stamp, epoch};
+  if (map) earlier = EarlierMap{std::move(*map), T_origin_camera, covariance, last_pose_stamp, epoch};
   map.reset();
   ++epoch;
-  const std::int64_t last = last_pose_stamp.value_or(seed->newestStamp());
-  const Matrix6d unseen = prior.outageCovariance(static_cast<double>(seed->newestStamp() - last) * 1e-9);
+  const std::int64_t last = last_pose_stamp.value_or(fallback_map->newestStamp());
+  const Matrix6d unseen = prior.outageCovariance(static_cast<double>(fallback_map->newestStamp() - last) * 1e-9);
   covariance.beginMap();
   covariance.inflate(prior.unmeasuredCovariance() + unseen);
-  last_pose_stamp = seed->newestStamp();
+  last_pose_stamp = fallback_map->newestStamp();
 }
 
-void OdometryState::comeBack() {
-  T_origin_camera = left->T_origin_camera;
-  covariance = left->covariance;
-  last_pose_stamp = left->last_pose_stamp;
-  epoch = left->epoch;
+void OdometryState::returnToEarlierMap() {
+  T_origin_camera = earlier->T_origin_camera;
+  covariance = earlier->covariance;
+  last_pose_stamp = earlier->last_pose_stamp;
+  epoch = earlier->epoch;
 }
 
-void OdometryState::takeSeed() {
-  // The guesses' error up to the seed is in all poses that are measured against it.
+void OdometryState::useFallbackMap() {
+  // The guesses' error up to the fallback map is in all poses that are measured against it.
   covariance.beginMap();
-  map = std::exchange(seed, std::nullopt);
+  map = std::exchange(fallback_map, std::nullopt);
   started = true;
   interrupted = false;
   outage.end();

@@ -39,9 +39,9 @@ struct OdometryStep {
   bool hasPose() const { return state == TrackingState::kTracking || state == TrackingState::kDegraded; }
 };
 
-/// A map that another one replaced after an outage, and the last pose in it. Foreign images may have made the other
-/// one: the place of this one is looked for whenever the camera is lost.
-struct LeftMap {
+/// A map that another one replaced after an outage, and the last pose in it. Foreign images may have begun the other
+/// one, so a lost camera is also looked for in this map.
+struct EarlierMap {
   LocalMap map;
   Eigen::Isometry3d T_origin_camera;
   PoseCovariance covariance;
@@ -62,10 +62,10 @@ struct OdometryState {
   std::optional<LocalMap> candidate;  ///< the map with the pair; kept to reuse its memory
   /// The map that the newest pair of an outage begins, at the guesses' pose, else at the last pose. It replaces `map`
   /// once the next pair is measured against it.
-  std::optional<LocalMap> seed;
-  bool seed_has_pose = false;  ///< the seed's pose is that of the guesses
-  std::optional<LeftMap> left;
-  std::optional<RolledPair> newest;  ///< that joined the map or the seed; only with a rolling shutter
+  std::optional<LocalMap> fallback_map;
+  bool fallback_has_pose = false;  ///< its pose is that of the guesses
+  std::optional<EarlierMap> earlier;
+  std::optional<RolledPair> newest;  ///< that joined the map or the fallback map; only with a rolling shutter
   LearntRig rig;
   RollingShutter shutter;
   MotionPrior prior;
@@ -79,7 +79,7 @@ struct OdometryState {
   std::optional<std::int64_t> last_stamp;
   Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
   PoseCovariance covariance;                    ///< of that pose
-  OdometryResult sound;                         ///< the last one with a pose
+  OdometryResult last_sound;                    ///< the last one with a pose and without a defect
   std::optional<std::int64_t> last_pose_stamp;  ///< ns
   double distance = 0.0;                        ///< m
   int pairs = 0;
@@ -102,14 +102,15 @@ struct OdometryState {
   /// gave is kept. The next pair starts a map there under a new epoch.
   void recover(const VisualOdometryOptions& options);
 
-  /// A new epoch begins at the seed. The unknown motion before it widens the covariance. The map, if any, is left.
+  /// A new epoch begins with the fallback map. The unknown motion before it widens the covariance. The map, if any,
+  /// becomes the earlier one.
   void startAgain();
-  /// The camera is found in the map that was left: epoch and pose are those of that map again.
-  void comeBack();
-  /// Earlier maps are of no use for the next pairs.
-  void forgetMaps() { map.reset(), left.reset(); }
-  /// The seed becomes the map.
-  void takeSeed();
+  /// The camera is found in the earlier map: epoch and pose are those of that map again.
+  void returnToEarlierMap();
+  /// The maps are of no use for the next pairs.
+  void forgetMaps() { map.reset(), earlier.reset(); }
+  /// The fallback map becomes the map.
+  void useFallbackMap();
 
   /// The pair's calibration is new: a map begins with it at the last pose, and the rig's estimates start anew.
   void recalibrate(const VisualOdometryOptions& options, const StereoFeatures& given);

@@ -22,15 +22,15 @@ Eigen::Isometry3d motionBy(const MotionGuess& guess, const MotionPrior& prior, d
 
 void Outage::extend(double dt, const std::optional<MotionGuess>& guess, const MotionPrior& prior) {
   seconds_ += dt;
-  if (!guess) followed_.reset();
-  if (!followed_) return;
+  if (!guess) guessed_motion_.reset();
+  if (!guessed_motion_) return;
   const Eigen::Isometry3d motion = motionBy(*guess, prior, dt);
   const Matrix6d carried = adjoint(motion.inverse());
   Matrix6d covariance = covarianceOf(*guess, prior.around(motion, dt).covariance);
   if (guess->rotation_only) covariance.topLeftCorner<3, 3>() = growth(prior, dt).topLeftCorner<3, 3>();
-  followed_->motion = followed_->motion * motion;
-  followed_->covariance = carried * followed_->covariance * carried.transpose() + covariance;
-  followed_->rotation_only |= guess->rotation_only;
+  guessed_motion_->motion = guessed_motion_->motion * motion;
+  guessed_motion_->covariance = carried * guessed_motion_->covariance * carried.transpose() + covariance;
+  guessed_motion_->rotation_only |= guess->rotation_only;
 }
 
 /// Covariance that a guess adds to those before it. A scale error's standard deviation is proportional to the whole

@@ -15,34 +15,34 @@ Eigen::Isometry3d motionBy(const MotionGuess& guess, const MotionPrior& prior, d
 /// Time since the last measured motion, pairs that were predicted, and the motion by guesses meanwhile.
 class Outage {
  public:
-  /// Motion since the last pose, m and rad.
-  struct Followed : ExpectedMotion {
+  /// Motion since the last pose by guesses alone, m and rad.
+  struct GuessedMotion : ExpectedMotion {
     bool rotation_only = false;  ///< the translation is the prior's
   };
 
   /// Adds a pair `dt` s after the previous one, and the guess of the motion between them, if there is one.
   void extend(double dt, const std::optional<MotionGuess>& guess, const MotionPrior& prior);
 
-  /// The motion by guesses; none if a guess is missing since the last pose.
-  const std::optional<Followed>& followed() const { return followed_; }
+  /// None if a guess is missing since the last pose.
+  const std::optional<GuessedMotion>& guessedMotion() const { return guessed_motion_; }
 
   /// Covariance, m^2 and rad^2, by which the unknown motion of the outage grew in the last `dt` s.
   Matrix6d growth(const MotionPrior& prior, double dt) const;
-  /// That of the unknown motion in the last `dt` s alone.
-  Matrix6d last(const MotionPrior& prior, double dt) const { return prior.lastStepCovariance(seconds_, dt); }
+  /// Covariance of the unknown motion in the last `dt` s alone.
+  Matrix6d lastStep(const MotionPrior& prior, double dt) const { return prior.lastStepCovariance(seconds_, dt); }
 
   int predictedPairs() const { return predicted_pairs_; }
   void countPrediction() { ++predicted_pairs_; }
 
-  /// The pair has a pose, and followed() begins there.
-  void havePose() { followed_ = Followed(); }
+  /// The pair has a pose, and guessedMotion() begins there.
+  void havePose() { guessed_motion_ = GuessedMotion(); }
   /// The pair's motion is measured.
   void end();
 
  private:
   Matrix6d covarianceOf(const MotionGuess& guess, const Matrix6d& process_noise);
 
-  std::optional<Followed> followed_ = Followed();
+  std::optional<GuessedMotion> guessed_motion_ = GuessedMotion();
   double distance_ = 0.0, angle_ = 0.0;  ///< sums over the outage's guesses, m and rad
   double seconds_ = 0.0;
   int predicted_pairs_ = 0;

@@ -19,7 +19,7 @@ PairSearch::PairSearch(const VisualOdometryOptions& options, const SearchTools& 
     : options_(options), tools_(tools), state_(state), given_(given), guess_(guess) {
   if (state.last_stamp) dt_ = static_cast<double>(given.stamp - *state.last_stamp) * 1e-9;
   searchBy(given.camera);
-  if (kind_ != kFollowed || !state.lens || !state.lens->isLike(given.camera) || !movesFeatures(*state.lens)) return;
+  if (kind_ != kContinues || !state.lens || !state.lens->isLike(given.camera) || !movesFeatures(*state.lens)) return;
   // Either the lens moved, or camera_info changed without it: a fault of the driver, or a new calibration.
   const double by_given = logLikelihood();
   searchBy(*state.lens);
@@ -31,13 +31,13 @@ PairSearch::PairSearch(const VisualOdometryOptions& options, const SearchTools& 
 void PairSearch::searchBy(const StereoCamera& lens) {
   take(lens);
   if (!state_.map || !state_.map->continuedBy(taken()))
-    kind_ = kFirst;
+    kind_ = kNoMap;
   else if (state_.interrupted)
-    kind_ = kSought;
+    kind_ = kAfterOutage;
   else if ((frozen_ = logOddsOfFrozen()) >= kCertain)
     kind_ = kFrozen;
   else
-    kind_ = kFollowed;
+    kind_ = kContinues;
   compensate();
   findRotated();
 }
@@ -48,7 +48,7 @@ void PairSearch::take(const StereoCamera& lens) {
   lens_ = lens;
   refocused_.reset(), new_part_.reset(), rotated_back_.reset(), synchronised_.reset();
   newest_.reset(), map_.reset();
-  rotation_ = ShownRotation();
+  rotation_ = RotationHypothesis();
   if (lens != given_.camera) refocused_ = given_, refocused_->camera = lens;
   if (state_.camera && *state_.camera != lens && state_.camera->isLike(lens))
     refocused_ = whole().seenBy(*state_.camera);
@@ -109,7 +109,7 @@ double PairSearch::logOddsOfFrozen() const {
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
   if (guess_) turn.linear() = guess_->T_previous_current.linear();
   if (moved(turn)) return kCertain;
-  const auto prior = state_.prior.confirmed(*state_.last_stamp, dt_);
+  const auto prior = state_.prior.priorByConfirmed(*state_.last_stamp, dt_);
   const auto expected = expectedMotion(std::nullopt);
   if (!prior || !moved(expected.value_or(prior->motion))) return kUnsuspected;
   if (images.comeTwice()) return kCertain;
@@ -125,7 +125,7 @@ void PairSearch::compensate() {
   const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + rotation_.value) : rig.rotation;
   rotated_back_.reset();
   if (!rotation.isZero()) rotated_back_ = rotatedBack(part(), rotation);
-  const bool has_map = kind_ == kFollowed || kind_ == kSought;
+  const bool has_map = kind_ == kContinues || kind_ == kAfterOutage;
   const bool is_predicted = has_map && state_.prior.velocity() && dt_ <= options_.tracking.max_gap;
   if (is_predicted) synchronised_ = synchronised(*state_.prior.velocity());
   roll(is_predicted ? *state_.prior.velocity() : Vector6d::Zero());
@@ -158,15 +158,15 @@ bool PairSearch::rollAgain() {
   now.forgetMotion();
   now.rate_by_rows = shutter.rateByRows(now, found_);
   bool has_changed = false;
-  if (kind_ == kFollowed) {
+  if (kind_ == kContinues) {
     const Eigen::Isometry3d motion = found_.motion.T_current_reference.inverse();
     now.dt = state_.prior.interval(state_.map->secondsUntil(now.features), motion);
-    now.mean = logSE3(motion) / now.dt;
+    now.mean_velocity = logSE3(motion) / now.dt;
     if (state_.newest && state_.newest->features.stamp == state_.map->newestStamp()) {
       const RolledPair& newest = *state_.newest;
-      now.mean_before = newest.mean;
+      now.mean_velocity_before = newest.mean_velocity;
       if (!newest_) newest_ = newest;
-      if (changes(*newest_, shutter.velocityBetween(newest, *now.mean))) {
+      if (changes(*newest_, shutter.velocityBetween(newest, *now.mean_velocity))) {
         has_changed = true;
         map_ = state_.map;
         map_->moveNewest(shutter.asGlobal(newest), shutter.asGlobal(*newest_), state_.rig.calibration.calibration());
@@ -180,11 +180,12 @@ bool PairSearch::rollAgain() {
   return has_changed;
 }
 
-/// Searches in the map, after an outage also in the seed. Returns the camera's velocity; zero if nothing is found.
+/// Searches in the map, after an outage also in the earlier map and the fallback map. Returns the camera's velocity;
+/// zero if nothing is found.
 Vector6d PairSearch::find() {
   scene_.reset();
-  if (kind_ == kFollowed) scene_.emplace(sceneOf(map_ ? *map_ : *state_.map, dt_, guess_));
-  if (kind_ == kSought)
+  if (kind_ == kContinues) scene_.emplace(sceneOf(map_ ? *map_ : *state_.map, dt_, guess_));
+  if (kind_ == kAfterOutage)
     if (auto place = reacquired()) scene_.emplace(std::move(*place));
   found_ = scene_ ? tools_.motions.find(*scene_, largestDoubt(options_.tracking)) : MotionHypothesis();
   if (!found_.motion.success) return Vector6d::Zero();
@@ -196,7 +197,7 @@ Vector6d PairSearch::find() {
 Vector6d PairSearch::findSynchronised() {
   constexpr double kNegligible = 0.02;  // px (chosen): a fifth of a disparity's noise
   const Vector6d velocity = find();
-  if (kind_ != kFollowed || !synchronised_ || !found_.motion.success) return velocity;
+  if (kind_ != kContinues || !synchronised_ || !found_.motion.success) return velocity;
   const double delay = taken().right_delay + state_.rig.calibration.delay();
   const double unexpected = (velocity - *state_.prior.velocity()).tail<3>().norm();
   if (std::abs(delay) * given_.camera.fx * unexpected < kNegligible) return velocity;
@@ -213,16 +214,16 @@ Vector6d PairSearch::findGlobal() {
   return velocity;
 }
 
-/// Rotation of the right camera, with a `supposed` one that is compensated already, rad.
-ShownRotation PairSearch::shownBeyond(const Eigen::Vector3d& supposed) {
+/// New rotation of the right camera; features are rotated back by its part `compensated`, rad, already.
+RotationHypothesis PairSearch::rotationBeyond(const Eigen::Vector3d& compensated) {
   const Vector6d velocity = findGlobal();
   const Eigen::Vector3d turn = dt_ * velocity.tail<3>();
   const Eigen::Vector3d before = dt_ * state_.prior.velocity().value_or(Vector6d::Zero()).tail<3>();
   const Eigen::Matrix3d turns = turn * turn.transpose() + before * before.transpose();
-  return state_.rig.shownRotation(features(), found_, supposed, turns, dt_);
+  return state_.rig.rotationHypothesis(features(), found_, compensated, turns, dt_);
 }
 
-void PairSearch::compensateFor(const ShownRotation& rotation) {
+void PairSearch::compensateFor(const RotationHypothesis& rotation) {
   rotation_ = rotation;
   compensate();
 }
@@ -230,14 +231,14 @@ void PairSearch::compensateFor(const ShownRotation& rotation) {
 /// If the right camera seems to have rotated, features are compensated again and the search is repeated. Without a
 /// motion of most matches, a yaw of the right camera is tried; it is kept if more matches agree.
 void PairSearch::findRotated() {
-  rotation_ = shownBeyond(Eigen::Vector3d::Zero());
-  if (kind_ == kFollowed && scene_->T_current_reference && !found_.isOfMajority()) {
+  rotation_ = rotationBeyond(Eigen::Vector3d::Zero());
+  if (kind_ == kContinues && scene_->T_current_reference && !found_.isOfMajority()) {
     // After a knock beyond the matches' noise no motion explains both views, but the left one alone may be explained.
-    const ShownRotation at_first = rotation_;
+    const RotationHypothesis at_first = rotation_;
     const int inliers = found_.agreement.inliers;
     const Eigen::Vector3d yaw = yawByDisparities(given_.camera, found_.correspondences, *scene_->T_current_reference);
     compensateFor({yaw, Eigen::Matrix3d::Zero(), kCertain, kUnsuspected});
-    rotation_ = shownBeyond(yaw);
+    rotation_ = rotationBeyond(yaw);
     if (!found_.motion.success || found_.agreement.inliers <= inliers || !(rotation_.log_odds > 0.0))
       compensateFor(at_first), findGlobal();
   }
@@ -262,7 +263,7 @@ MotionScene PairSearch::sceneOf(const LocalMap& map, double dt, const std::optio
                     state_.rig.noise};
   const Eigen::Isometry3d T_reference_previous = map.newestPose() * state_.T_origin_camera;
   const double since = map.secondsUntil(features());
-  if (const auto confirmed = prior.confirmed(map.newestStamp(), since)) scene.prior.push_back(*confirmed);
+  if (const auto confirmed = prior.priorByConfirmed(map.newestStamp(), since)) scene.prior.push_back(*confirmed);
   if (prior.velocity() && dt <= options_.tracking.max_gap)
     scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
   if (guess) {
@@ -272,11 +273,11 @@ MotionScene PairSearch::sceneOf(const LocalMap& map, double dt, const std::optio
   return scene;
 }
 
-/// Where the pair is in the map from before an outage, in the one before that, then in the seed. The camera's motion
-/// meanwhile is unknown.
+/// Where the pair is in the map from before the outage, in the earlier map, else in the fallback map. The camera's
+/// motion meanwhile is unknown.
 std::optional<MotionScene> PairSearch::reacquired() const {
   std::optional<MotionScene> scene;
-  for (const LocalMap* map : {&*state_.map, state_.left ? &state_.left->map : nullptr}) {
+  for (const LocalMap* map : {&*state_.map, state_.earlier ? &state_.earlier->map : nullptr}) {
     if (!map || !map->continuedBy(features())) continue;
     const auto place = tools_.places.find(*map, features(), state_.rig.calibration.calibration());
     const double since = map->secondsUntil(features());
@@ -287,7 +288,7 @@ std::optional<MotionScene> PairSearch::reacquired() const {
     scene->prior.clear();
     return scene;
   }
-  if (state_.seed) scene.emplace(sceneOf(*state_.seed, 0.0, std::nullopt));
+  if (state_.fallback_map) scene.emplace(sceneOf(*state_.fallback_map, 0.0, std::nullopt));
   return scene;
 }
 

@@ -33,8 +33,12 @@ class PairSearch {
   PairSearch(const PairSearch&) = delete;  // its parts refer to each other
   PairSearch& operator=(const PairSearch&) = delete;
 
-  /// Without a map of its camera; after an outage; with repeated images; after a pose.
-  enum Kind { kFirst, kSought, kFrozen, kFollowed };
+  enum Kind {
+    kNoMap,        ///< no map of its camera: it begins one
+    kAfterOutage,  ///< its pose in the map is unknown: it is looked for in all maps
+    kFrozen,       ///< its images repeat although the camera moved: nothing is searched
+    kContinues,    ///< the pair before has a pose in the map: the motion is searched near the expected one
+  };
   Kind kind() const { return kind_; }
 
   double dt() const { return dt_; }          ///< since the previous pair, s
@@ -54,7 +58,7 @@ class PairSearch {
   bool refutesCamera() const { return lens_ != given_.camera; }
 
   /// New rotation of the right camera, for which features are compensated if it is likely.
-  const ShownRotation& rotation() const { return rotation_; }
+  const RotationHypothesis& rotation() const { return rotation_; }
   /// The pair before its rows were moved to the stamp; only with a rolling shutter.
   std::optional<RolledPair>& rolled() { return rolled_; }
 
@@ -77,12 +81,13 @@ class PairSearch {
   std::optional<StereoFeatures> synchronised(const Vector6d& velocity) const;
   void roll(const Vector6d& velocity);
   bool rollAgain();
+  // Each of the next four repeats the one before it with features that are compensated better.
   Vector6d find();
   Vector6d findSynchronised();
   Vector6d findGlobal();
-  ShownRotation shownBeyond(const Eigen::Vector3d& supposed);
-  void compensateFor(const ShownRotation& rotation);
   void findRotated();
+  RotationHypothesis rotationBeyond(const Eigen::Vector3d& compensated);
+  void compensateFor(const RotationHypothesis& rotation);
   MotionScene sceneOf(const LocalMap& map, double dt, const std::optional<MotionGuess>& guess) const;
   std::optional<MotionScene> reacquired() const;
 
@@ -92,7 +97,7 @@ class PairSearch {
   const StereoFeatures& given_;
   const std::optional<MotionGuess>& guess_;
   StereoCamera lens_;
-  Kind kind_ = kFirst;
+  Kind kind_ = kNoMap;
   double dt_ = 0.0;
   double frozen_ = kUnsuspected;
   std::vector<int> new_features_;
@@ -101,7 +106,7 @@ class PairSearch {
   std::optional<StereoFeatures> global_;  // rows moved to the stamp
   std::optional<RolledPair> newest_;      // of the map, with its velocity since the pair's motion is known
   std::optional<LocalMap> map_;           // with this velocity
-  ShownRotation rotation_;
+  RotationHypothesis rotation_;
   std::optional<MotionScene> scene_;
   MotionHypothesis found_;
 };

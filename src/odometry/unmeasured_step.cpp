@@ -11,15 +11,15 @@ std::string missing(const StereoFeatures& features) {
 }
 
 /// Whether guesses move the pose: the pair has too few features, and the last measured one is recent.
-bool canFollow(const VisualOdometryOptions& options, const StereoFeatures& features, const OdometryState& state) {
-  const auto& followed = state.outage.followed();
-  if (!state.map || !followed || features.count() >= options.motion.min_inliers) return false;
+bool canUseGuesses(const VisualOdometryOptions& options, const StereoFeatures& features, const OdometryState& state) {
+  const auto& guessed = state.outage.guessedMotion();
+  if (!state.map || !guessed || features.count() >= options.motion.min_inliers) return false;
   const TrackingOptions& tracking = options.tracking;
-  return state.map->secondsUntil(features) <= (followed->rotation_only ? tracking.max_gap : tracking.max_guessed);
+  return state.map->secondsUntil(features) <= (guessed->rotation_only ? tracking.max_gap : tracking.max_guessed);
 }
 
 /// Moves the pose by an unmeasured motion.
-OdometryStep follow(const ExpectedMotion& expected, const std::string& reason, OdometryState& state) {
+OdometryStep stepBy(const ExpectedMotion& expected, const std::string& reason, OdometryState& state) {
   OdometryStep step;
   step.state = TrackingState::kDegraded;
   step.reason = reason;
@@ -29,48 +29,57 @@ OdometryStep follow(const ExpectedMotion& expected, const std::string& reason, O
   return step;
 }
 
+OdometryStep stepWithoutMotion(TrackingState tracking, const std::string& reason) {
+  OdometryStep step;
+  step.state = tracking;
+  step.reason = reason;
+  return step;
+}
+
+/// Begins the fallback map with the pair, at the pose by guesses, else at the last pose (`guessed` is null).
+void beginFallbackMap(const VisualOdometryOptions& options, const StereoFeatures& features,
+                      const Outage::GuessedMotion* guessed, OdometryState& state) {
+  const Eigen::Isometry3d T_previous_current = guessed ? guessed->motion : Eigen::Isometry3d::Identity();
+  state.fallback_map.emplace(options.map);
+  state.fallback_map->insert(alignmentWith(options.noise), features, state.pairs,
+                             (state.T_origin_camera * T_previous_current).inverse(), {},
+                             state.rig.calibration.calibration());
+  state.fallback_has_pose = guessed && !guessed->rotation_only;
+}
+
 }  // namespace
 
 OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures& features, OdometryState& state) {
-  OdometryStep step;
   state.interrupt();
-  const auto followed = state.outage.followed();
-  if (canFollow(options, features, state)) return follow(*followed, "motion by the guess: " + missing(features), state);
-  if (features.count() < options.motion.min_inliers) {
-    step.state = state.started ? TrackingState::kLost : TrackingState::kWaiting;
-    step.reason = missing(features);
-    return step;
-  }
-  const bool is_guessed = state.started && followed;
-  const Eigen::Isometry3d T_previous_current = is_guessed ? followed->motion : Eigen::Isometry3d::Identity();
-  state.seed.emplace(options.map);
-  state.seed->insert(alignmentWith(options.noise), features, state.pairs,
-                     (state.T_origin_camera * T_previous_current).inverse(), {}, state.rig.calibration.calibration());
-  state.seed_has_pose = is_guessed && !followed->rotation_only;
-  // The seed replaces a map from before the outage only when a pair is measured against it.
+  const auto guessed = state.outage.guessedMotion();
+  if (canUseGuesses(options, features, state))
+    return stepBy(*guessed, "motion by the guess: " + missing(features), state);
+  if (features.count() < options.motion.min_inliers)
+    return stepWithoutMotion(state.started ? TrackingState::kLost : TrackingState::kWaiting, missing(features));
+
+  const bool is_guessed = state.started && guessed;
+  beginFallbackMap(options, features, is_guessed ? &*guessed : nullptr, state);
+
+  // The fallback map replaces a map from before the outage only when a pair is measured against it.
   const bool has_map = state.started && state.map && state.map->continuedBy(features);
   if (is_guessed) {
-    step = follow(*followed,
-                  std::string(has_map ? "not found in the map: goes on" : "started again") +
-                      (followed->rotation_only ? " as the gyro turned; the translation is predicted"
-                                               : " where the guess has the camera"),
-                  state);
+    const OdometryStep step = stepBy(*guessed,
+                                     std::string(has_map ? "not found in the map: goes on" : "started again") +
+                                         (guessed->rotation_only ? " as the gyro turned; the translation is predicted"
+                                                                 : " where the guess has the camera"),
+                                     state);
     if (has_map) return step;
-    if (followed->rotation_only) ++state.epoch;
-  } else if (has_map) {
-    step.state = TrackingState::kLost;
-    step.reason = "not found in the map: the next pair may be, or goes on from here";
+    if (guessed->rotation_only) ++state.epoch;
+    state.useFallbackMap();
     return step;
-  } else if (state.started) {
-    step.state = TrackingState::kDegraded;
-    step.reason = kStartedAgain;
-    state.startAgain();
-  } else {
-    step.state = TrackingState::kTracking;
-    step.reason = "first pair";
   }
-  state.takeSeed();
-  return step;
+  if (has_map)
+    return stepWithoutMotion(TrackingState::kLost, "not found in the map: the next pair may be, or goes on from here");
+  const bool starts_again = state.started;
+  if (starts_again) state.startAgain();
+  state.useFallbackMap();
+  return starts_again ? stepWithoutMotion(TrackingState::kDegraded, kStartedAgain)
+                      : stepWithoutMotion(TrackingState::kTracking, "first pair");
 }
 
 OdometryStep holdPose(double dt, OdometryState& state) {
@@ -80,7 +89,7 @@ OdometryStep holdPose(double dt, OdometryState& state) {
                     ? "each pair comes twice: is the driver's rate above the sensor's?"
                     : "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
   step.T_previous_current = Eigen::Isometry3d::Identity();
-  step.covariance = state.outage.last(state.prior, dt);
+  step.covariance = state.outage.lastStep(state.prior, dt);
   state.covariance.predict(*step.T_previous_current, state.outage.growth(state.prior, dt));
   state.prior.interrupt();
   return step;
@@ -91,12 +100,13 @@ OdometryStep predictMotion(const VisualOdometryOptions& options, const StereoFea
   const std::string reason = failure + (features.report.status.empty() ? "" : "; " + features.report.status);
   const bool can_predict = state.prior.velocity() && dt <= options.tracking.max_gap &&
                            state.outage.predictedPairs() < options.tracking.max_predicted_pairs;
-  // A gyro's guess has the translation's covariance around standstill; over one pair the prior's is smaller.
-  if (canFollow(options, features, state) && !(can_predict && state.outage.followed()->rotation_only))
-    return follow(*state.outage.followed(), "motion by the guess: " + reason, state);
+  // A gyro measures no translation: the guess then has the covariance of an outage around standstill. Over one pair a
+  // prediction has the smaller one.
+  if (canUseGuesses(options, features, state) && !(can_predict && state.outage.guessedMotion()->rotation_only))
+    return stepBy(*state.outage.guessedMotion(), "motion by the guess: " + reason, state);
   if (can_predict) {
     state.outage.countPrediction();
-    return follow(state.prior.predicted(dt), "motion predicted: " + reason, state);
+    return stepBy(state.prior.predicted(dt), "motion predicted: " + reason, state);
   }
   OdometryStep step = startMap(options, features, state);
   if (step.state == TrackingState::kLost) step.reason = reason;

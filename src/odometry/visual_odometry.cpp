@@ -53,7 +53,7 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
     const double velocity = (camera.project(now).y() - found.view->pixels[reference].y) / dt;
     const double dv = has_pattern ? pattern.change(features, current) : features.dv[current];
     rows.push_back({velocity, dv - delay * velocity,
-                    RowDelay::cellOf(features.u[current], features.v[current], camera.width, camera.height)});
+                    RowDelay::partOf(features.u[current], features.v[current], camera.width, camera.height)});
   }
   return rows;
 }
@@ -93,19 +93,19 @@ class VisualOdometry::Impl {
   struct Outcome {
     std::string refusal;
     std::optional<Candidate> candidate;
-    double since = 0.0;         ///< the map's newest pair, s
-    bool is_seed = false;       ///< it is measured against the seed, ...
-    bool starts_again = false;  ///< ... whose pose is not that of the guesses
-    bool comes_back = false;    ///< it is in the map that was left
+    double since = 0.0;           ///< the map's newest pair, s
+    bool in_fallback = false;     ///< it is measured against the fallback map, ...
+    bool starts_again = false;    ///< ... whose pose is not that of the guesses
+    bool in_earlier_map = false;  ///< it is found in the map from before a restart
   };
 
   void refuse(const StereoFeatures& features) const;
-  OdometryResult sound(OdometryResult result);
+  OdometryResult checkedResult(OdometryResult result);
   std::optional<Floor> floor() const;
 
   void begin(const PairSearch& pair, const std::optional<MotionGuess>& guess);
   std::optional<MeasuredPair> measuredPair(const PairSearch& pair) const;
-  std::vector<Evidence> evidenceAgainst(const PairSearch& pair, const std::optional<MeasuredPair>& measured);
+  std::vector<Evidence> evidenceAgainst(const PairSearch& pair, const std::optional<MeasuredPair>& measured) const;
   Step unmeasured(const PairSearch& pair, const std::string& why, const std::vector<Evidence>& evidence);
   Outcome judged(PairSearch& pair);
   Candidate adjustBeyondDoubt(PairSearch& pair);
@@ -193,7 +193,7 @@ void VisualOdometry::Impl::takePose(const Matrix6d& covariance) {
   given.has_pose = true, given.pose_covariance = covariance;
   if (const std::string defect = given.defect(); !defect.empty()) throw std::invalid_argument(defect);
   state_.covariance.reset(covariance);
-  state_.left.reset();  // its poses are from before
+  state_.earlier.reset();  // its poses are from before
   ++state_.epoch;
   if (!state_.interrupted) return;
   state_.map.reset();
@@ -209,6 +209,9 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   Stopwatch stopwatch;
   begin(pair, guess);
   const std::optional<MeasuredPair> measured = measuredPair(pair);
+  if (measured)
+    state_.rig.right_delay.updateOtherPair(measured->rows, measured->dt,
+                                           options_.noise.corner * state_.rig.noise.scale());
   const std::vector<Evidence> evidence = evidenceAgainst(pair, measured);
   const Outcome outcome = judged(pair);
   Step step = outcome.candidate ? apply(outcome, pair, evidence) : unmeasured(pair, outcome.refusal, evidence);
@@ -217,9 +220,10 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   finish(pair, step);
   rememberRolled(pair, step);
   if (options_.calibration.enabled && options_.calibration.readout == 0.0)
-    state_.shutter.setReadout(state_.rig.readout.proved());
+    state_.shutter.setReadout(state_.rig.readout.usableValue());
   step.time = stopwatch.lap();
-  const OdometryResult result = sound(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
+  const OdometryResult result =
+      checkedResult(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
   // A driver's fault is short: a calibration that lasts is new.
   if (result.has_pose && pair.refutesCamera() &&
       1e-9 * static_cast<double>(given.stamp - *state_.lens_stamp) > options_.tracking.max_gap)
@@ -227,11 +231,11 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   return result;
 }
 
-/// The only way out of update(): no result leaves with a number that is not finite or a covariance that is none.
-OdometryResult VisualOdometry::Impl::sound(OdometryResult result) {
+/// The only way out of update(): no result leaves with a number that is not finite or an indefinite covariance.
+OdometryResult VisualOdometry::Impl::checkedResult(OdometryResult result) {
   const std::string defect = result.defect();
   if (defect.empty()) {
-    if (result.has_pose) state_.sound = result;
+    if (result.has_pose) state_.last_sound = result;
     return result;
   }
   state_.recover(options_);
@@ -264,22 +268,21 @@ std::optional<MeasuredPair> VisualOdometry::Impl::measuredPair(const PairSearch&
 
 /// Evidence of the pair that its motion is not the camera's.
 std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const PairSearch& pair,
-                                                            const std::optional<MeasuredPair>& measured) {
-  LearntRig& rig = state_.rig;
-  const bool is_followed = pair.kind() == PairSearch::kFollowed;
+                                                            const std::optional<MeasuredPair>& measured) const {
+  const bool continues = pair.kind() == PairSearch::kContinues;
   // The map is from before the rotation.
-  std::vector<Evidence> evidence{{pair.rotation().log_odds, pair.rotation().words()},
-                                 {pair.rotation().other_moment, "the right image seemed to be of another moment"}};
+  std::vector<Evidence> evidence{
+      {pair.rotation().log_odds, pair.rotation().words()},
+      {pair.rotation().log_odds_of_other_moment, "the right image seemed to be of another moment"}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
-  if (is_followed)
+  if (continues)
     evidence.push_back({pair.frozen(), "images as of the previous pair, by a stop or a frozen driver", true});
   // After a short gap, the views may not be of one rigid world, and the next map would be as wrong.
-  if (is_followed && !pair.found().motion.success && pair.found().agreement.matches >= kManyMatches &&
+  if (continues && !pair.found().motion.success && pair.found().agreement.matches >= kManyMatches &&
       pair.dt() <= options_.tracking.max_gap)
     evidence.push_back({kCertain, "many matches agreed on no motion", true});
   if (!measured) return evidence;
-  rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
-  const RightCameraDelay::OtherPair other = rig.right_delay.otherPair(measured->dt);
+  const RightCameraDelay::OtherPair other = state_.rig.right_delay.otherPair(measured->dt);
   evidence.push_back({other.log_odds, other.words()});
   evidence.push_back(
       {kUnsuspected + state_.prior.logRatioOfSwap(measured->T_current_reference.inverse(), measured->since_reference),
@@ -313,9 +316,9 @@ VisualOdometry::Impl::Outcome VisualOdometry::Impl::judged(PairSearch& pair) {
   if (!found.motion.success) return outcome;
   const MotionScene& scene = *pair.scene();
   outcome.since = scene.map.secondsUntil(pair.features());
-  outcome.is_seed = state_.seed && &scene.map == &*state_.seed;
-  outcome.starts_again = outcome.is_seed && !state_.seed_has_pose;
-  outcome.comes_back = state_.left && &scene.map == &state_.left->map;
+  outcome.in_fallback = state_.fallback_map && &scene.map == &*state_.fallback_map;
+  outcome.starts_again = outcome.in_fallback && !state_.fallback_has_pose;
+  outcome.in_earlier_map = state_.earlier && &scene.map == &state_.earlier->map;
   outcome.refusal =
       state_.prior.tooFast(found.motion.T_current_reference.inverse(), found.motion.covariance, outcome.since);
   if (!outcome.refusal.empty()) return outcome;
@@ -335,7 +338,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::unmeasured(const PairSearch& pa
                                                             const std::vector<Evidence>& evidence) {
   state_.doubt.raise(evidence);
   if (pair.kind() == PairSearch::kFrozen) return holdPose(pair.dt(), state_);
-  if (pair.kind() == PairSearch::kFollowed) return predictMotion(options_, pair.features(), pair.dt(), why, state_);
+  if (pair.kind() == PairSearch::kContinues) return predictMotion(options_, pair.features(), pair.dt(), why, state_);
   return startMap(options_, pair.features(), state_);
 }
 
@@ -344,8 +347,8 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, c
                                                        const std::vector<Evidence>& evidence) {
   const MotionHypothesis& found = pair.found();
   if (outcome.starts_again) state_.startAgain();
-  if (outcome.comes_back) state_.comeBack();
-  if (outcome.is_seed) state_.covariance.beginMap();
+  if (outcome.in_earlier_map) state_.returnToEarlierMap();
+  if (outcome.in_fallback) state_.covariance.beginMap();
   const Belief belief = state_.doubt.update(*pair.scene(), found, evidence);
   commit(*outcome.candidate, belief);
   Step step = measure(found, *outcome.candidate);
@@ -354,7 +357,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, c
   const std::string doubt = doubtWords(pair, *outcome.candidate, belief);
   step.state = doubt.empty() && !outcome.starts_again ? TrackingState::kTracking : TrackingState::kDegraded;
   step.probability = belief.probability;
-  step.changes_epoch = outcome.starts_again || outcome.comes_back;
+  step.changes_epoch = outcome.starts_again || outcome.in_earlier_map;
   if (!doubt.empty()) step.reason = "doubtful: " + doubt;
   // A motion that is probably not the camera's predicts nothing.
   if (belief.probability >= 0.5)
@@ -373,11 +376,11 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, c
 /// A motion is measured: forgets what an outage left. Returns how it ended; empty if there was none.
 std::string VisualOdometry::Impl::endOutage(const Outcome& outcome, const MotionHypothesis& found) {
   state_.outage.end();
-  state_.seed.reset();
-  if (outcome.comes_back) state_.left.reset();
+  state_.fallback_map.reset();
+  if (outcome.in_earlier_map) state_.earlier.reset();
   if (!std::exchange(state_.interrupted, false)) return "";
   if (outcome.starts_again) return kStartedAgain;
-  if (outcome.is_seed) return "goes on where the guess had the camera";
+  if (outcome.in_fallback) return "goes on where the guess had the camera";
   return "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map";
 }
 
@@ -392,9 +395,9 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(PairSear
   const std::size_t adjusted = found.sightings.size();
   found.countInliers(candidate.adjustment.rejected);
   if (!was_beyond_doubt || motions.isBeyondDoubt(found, most)) return candidate;
-  MotionScene suspected = *pair.scene();
-  suspected.is_suspected = true;
-  MotionHypothesis chosen = motions.find(suspected, most);
+  MotionScene scene = *pair.scene();
+  scene.all_compete = true;
+  MotionHypothesis chosen = motions.find(scene, most);
   if (!chosen.motion.success) return candidate;
   const Eigen::Isometry3d T_adjusted = std::exchange(found, std::move(chosen)).motion.T_current_reference;
   // Mostly the first motion prevails, and its adjustment is known.
@@ -485,11 +488,11 @@ void VisualOdometry::Impl::commit(const Candidate& candidate, const Belief& beli
   if (isDoubtful(belief)) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
-  state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration_by_rig,
-                              candidate.calibration, adjustment.calibration_information);
+  state_.rig.calibration.update(state_.map->oldestId(), state_.map->newestId(), candidate.calibration_by_rig,
+                                candidate.calibration, adjustment.calibration_information);
   if (isDoubtful(belief)) return;
   state_.rig.noise.learnPair(adjustment.newest_square);
-  if (adjustment.common_disparity_square) state_.rig.calibration.noteCommon(*adjustment.common_disparity_square);
+  if (adjustment.common_disparity_square) state_.rig.calibration.updateCommon(*adjustment.common_disparity_square);
 }
 
 /// The motion between the two reported poses, and its covariance.
@@ -528,16 +531,16 @@ void VisualOdometry::Impl::rememberRolled(PairSearch& pair, Step& step) {
   const auto ends_with_it = [&](const std::optional<LocalMap>& map) {
     return map && map->newestStamp() == pair.features().stamp;
   };
-  if (!pair.rolled() || (!ends_with_it(state_.map) && !ends_with_it(state_.seed))) return;
+  if (!pair.rolled() || (!ends_with_it(state_.map) && !ends_with_it(state_.fallback_map))) return;
   RolledPair& rolled = *pair.rolled();
   if (!pair.found().motion.success || !step.T_previous_current) {
     rolled.forgetMotion();
   } else {
-    const Matrix6d moment = state_.shutter.momentOf(rolled);
+    const Matrix6d moment = state_.shutter.covarianceByVelocity(rolled);
     step.covariance += moment;
     state_.covariance.addDoubt(moment, moment);
   }
-  if (state_.newest && rolled.mean) state_.shutter.learn(*state_.newest, *rolled.mean);
+  if (state_.newest && rolled.mean_velocity) state_.shutter.learn(*state_.newest, *rolled.mean_velocity);
   state_.newest = std::move(pair.rolled());
 }
 

@@ -13,7 +13,7 @@ namespace {
 using Matrix = RigEstimate::Matrix;
 using Vector = RigEstimate::Vector;
 
-constexpr int kRememberedCommons = 200;  // windows (chosen): memory of noteCommon()
+constexpr int kRememberedCommons = 200;  // windows (chosen): memory of updateCommon()
 // px/sqrt(s) (chosen): offset and bend change by 0.5 px in 100 s, by warmth or by knocks too small for a detection.
 constexpr double kWarming = 0.05;
 constexpr double kRolling = 5e-5;  // rad/sqrt(s) (chosen): kWarming at f = 1000 px
@@ -31,12 +31,12 @@ Matrix diagonal(double disparity, double roll, double delay) {
 }  // namespace
 
 CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : options_(checked(options)) {
-  used_ = priorOf(options_);
-  calibration_.value = used_.head<RigCalibration::kParameters>();
+  compensated_ = priorOf(options_);
+  calibration_.value = compensated_.head<RigCalibration::kParameters>();
 }
 
 const CalibrationFilter::Likelihood& CalibrationFilter::pastBefore(int oldest_id) const {
-  return pending_id_ >= 0 && pending_id_ < oldest_id ? pending_ : past_;
+  return next_past_id_ >= 0 && next_past_id_ < oldest_id ? next_past_ : past_;
 }
 
 CalibrationBelief CalibrationFilter::prior(const RigEstimate::Shape& shape) const {
@@ -49,13 +49,12 @@ CalibrationBelief CalibrationFilter::prior(const RigEstimate::Shape& shape) cons
     belief.mean = shape.leftCols<RigEstimate::kDelay>() * known.mean.head<RigEstimate::kDelay>();
     covariance += shape * known.covariance * shape.transpose();
   }
-  belief.information = covariance.inverse() / kHonest;
+  belief.information = covariance.inverse() / kRealInformation;
   if (commons_ >= kFewestMeasured) belief.common_sigma = std::sqrt(std::max(common_square_, 0.0));
   return belief;
 }
 
-/// Mean and covariance of the mixture. Its eight components have an error, or none, of disparity, roll and delay.
-RigEstimate CalibrationFilter::weigh(const Likelihood& windows) const {
+RigEstimate CalibrationFilter::posterior(const Likelihood& windows) const {
   const Vector prior = priorOf(options_);
   Matrix information = windows.information;
   Vector weighted = windows.information_mean - information * prior;
@@ -93,37 +92,39 @@ RigEstimate CalibrationFilter::weigh(const Likelihood& windows) const {
   return estimate;
 }
 
-RigEstimate CalibrationFilter::used() const {
+RigEstimate CalibrationFilter::compensated() const {
   const RigEstimate known = estimate();
-  const Vector apart = known.mean - used_;
-  return {used_, known.covariance + apart * apart.transpose()};
+  const Vector apart = known.mean - compensated_;
+  return {compensated_, known.covariance + apart * apart.transpose()};
 }
 
-void CalibrationFilter::noteCommon(double square) {
+void CalibrationFilter::updateCommon(double square) {
   commons_ = std::min(commons_ + 1, kRememberedCommons);
   common_square_ += (square - common_square_) / commons_;
 }
 
-void CalibrationFilter::note(int oldest_id, int newest_id, const RigEstimate::Shape& shape,
-                             const RigCalibration& calibration, const RigCalibration::Matrix& information) {
+void CalibrationFilter::update(int oldest_id, int newest_id, const RigEstimate::Shape& shape,
+                               const RigCalibration& calibration, const RigCalibration::Matrix& information) {
   const CalibrationBelief prior = this->prior(shape);
-  used_ << calibration.value.head<2>(), calibration.value[2] / shape(2, RigEstimate::kRoll), delay();
-  const RigCalibration::Vector compensated = shape.col(RigEstimate::kDelay) * used_[RigEstimate::kDelay];
-  past_ = pastBefore(oldest_id);
+  compensated_ << calibration.value.head<2>(), calibration.value[2] / shape(2, RigEstimate::kRoll), delay();
   calibration_ = calibration;
-  // `calibration` has the information of data and prior: own * own_mean = (own + prior) * value - prior * prior_mean.
+  // 1. The window's own information, without its prior: own * own_mean = (own + prior) * value - prior * prior_mean.
   // Only one triangle of `information` is accurate, and an asymmetry would grow from window to window.
-  const RigCalibration::Matrix own = 0.5 * kHonest * (information + information.transpose());
+  const RigCalibration::Vector by_delay = shape.col(RigEstimate::kDelay) * compensated_[RigEstimate::kDelay];
+  const RigCalibration::Matrix own = 0.5 * kRealInformation * (information + information.transpose());
   const RigCalibration::Vector own_mean =
-      own * (calibration.value + compensated) + kHonest * prior.information * (calibration.value - prior.mean);
+      own * (calibration.value + by_delay) + kRealInformation * prior.information * (calibration.value - prior.mean);
+  // 2. Add it to the windows before that share no pair with it.
+  past_ = pastBefore(oldest_id);
   present_ = Likelihood{past_.information + shape.transpose() * own * shape,
                         past_.information_mean + shape.transpose() * own_mean};
-  if (pending_id_ >= oldest_id) return;
-  pending_id_ = newest_id;
-  pending_ = *present_;
+  // 3. It is the past of windows that begin after its last pair.
+  if (next_past_id_ >= oldest_id) return;
+  next_past_id_ = newest_id;
+  next_past_ = *present_;
 }
 
-void CalibrationFilter::noteRows(int parameter, double value, double sigma) {
+void CalibrationFilter::updateByRows(int parameter, double value, double sigma) {
   constexpr double kExact = 1e-6;  // rad or s, the options' least sigma: rows of a simulator have no noise
   rows_information_[parameter] = 1.0 / (sigma * sigma + kExact * kExact);
   rows_[parameter] = value;
@@ -143,7 +144,7 @@ Matrix CalibrationFilter::widen(const Matrix& covariance) {
     const Matrix less = (Matrix::Identity() + known.information * covariance).inverse();
     known = {less * known.information, less * known.information_mean};
   };
-  widened(past_), widened(pending_);
+  widened(past_), widened(next_past_);
   if (present_) widened(*present_);
   return covariance;
 }

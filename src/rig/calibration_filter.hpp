@@ -16,9 +16,9 @@ namespace sdvo {
 /// shift the weights (Bayes factor), so no threshold decides what is compensated.
 class CalibrationFilter {
  public:
-  /// Factor on the information that a window's adjustment reports. The adjustment assumes independent errors of points,
-  /// so it is overconfident (chosen by the errors of long drives).
-  static constexpr double kHonest = 0.16 * 0.16;
+  /// Ratio of a window's real information to the one that its adjustment reports. The adjustment takes errors of points
+  /// for independent and reports 39 times too much (chosen by the errors of long drives).
+  static constexpr double kRealInformation = 0.16 * 0.16;
 
   explicit CalibrationFilter(const CalibrationOptions& options);
 
@@ -33,15 +33,15 @@ class CalibrationFilter {
 
   /// Adds the window from pair `oldest_id` to `newest_id`. `calibration` includes the window's prior(), `information`
   /// (1/px^2) excludes it.
-  void note(int oldest_id, int newest_id, const RigEstimate::Shape& shape, const RigCalibration& calibration,
-            const RigCalibration::Matrix& information);
+  void update(int oldest_id, int newest_id, const RigEstimate::Shape& shape, const RigCalibration& calibration,
+              const RigCalibration::Matrix& information);
 
   /// Sets the roll, rad, or the delay, s (RigEstimate::kRoll or kDelay), that all rows up to now imply, and its
   /// standard deviation. It replaces the value of the last call.
-  void noteRows(int parameter, double value, double sigma);
+  void updateByRows(int parameter, double value, double sigma);
 
   /// Averages the variance, px^2, of the disparity error that all sightings of a point share, as a window estimates it.
-  void noteCommon(double square);
+  void updateCommon(double square);
 
   /// The right camera rotated, and features are rotated back. Adds the covariance of this rotation, rad^2, and returns
   /// it as the rig's.
@@ -50,9 +50,9 @@ class CalibrationFilter {
   /// Result of the last window, px.
   const RigCalibration& calibration() const { return calibration_; }
   /// The rig that the last window compensated, and the second moment of estimate() around it.
-  RigEstimate used() const;
+  RigEstimate compensated() const;
   /// Estimate from the options, rows and all windows.
-  RigEstimate estimate() const { return weigh(present_.value_or(Likelihood())); }
+  RigEstimate estimate() const { return posterior(present_.value_or(Likelihood())); }
   /// The delay that is compensated, s.
   double delay() const { return estimate().delay(); }
   bool hasWindow() const { return present_.has_value(); }
@@ -67,19 +67,22 @@ class CalibrationFilter {
   };
 
   const Likelihood& pastBefore(int oldest_id) const;
-  RigEstimate weigh(const Likelihood& windows) const;
+  /// Posterior of the rig: mean and covariance of a mixture of eight components, each with an error, or none, of
+  /// disparity, roll and delay.
+  RigEstimate posterior(const Likelihood& windows) const;
   RigEstimate::Matrix widen(const RigEstimate::Matrix& covariance);
 
   CalibrationOptions options_;
   RigCalibration calibration_;
-  RigEstimate::Vector used_;  ///< by the last window
-  Likelihood past_;           ///< of windows that share no pair with the last one
-  Likelihood pending_;        ///< of past_ and a window up to pair `pending_id_`: past of windows that begin later
-  int pending_id_ = -1;
+  RigEstimate::Vector compensated_;  ///< the rig, by the last window
+  Likelihood past_;                  ///< of windows that share no pair with the last one
+  /// past_ with a window up to pair `next_past_id_`; becomes past_ for windows that begin after that pair.
+  Likelihood next_past_;
+  int next_past_id_ = -1;
   std::optional<Likelihood> present_;                                   ///< of past_ and the last window
-  RigEstimate::Vector rows_ = RigEstimate::Vector::Zero();              ///< see noteRows(): rad and s
+  RigEstimate::Vector rows_ = RigEstimate::Vector::Zero();              ///< see updateByRows(): rad and s
   RigEstimate::Vector rows_information_ = RigEstimate::Vector::Zero();  ///< 1/rad^2 and 1/s^2
-  int commons_ = 0;                                                     ///< number of noteCommon() calls, bounded
+  int commons_ = 0;                                                     ///< number of updateCommon() calls, bounded
   double common_square_ = 0.0;
 };
 

@@ -18,12 +18,12 @@ Eigen::Matrix3d withRectification(const RightRotation& measured) {
 }
 
 /// Log-likelihood ratio that the rotation, for which features are compensated, moved the rows, against a fault of the
-/// disparities alone. `left`: what rows show after the compensation.
-double logRatioOfRows(const std::optional<RightRotation>& left, const Eigen::Vector3d& rotation) {
-  if (!left) return 0.0;
-  const Eigen::Matrix3d information = withRectification(*left).inverse();
-  const Eigen::Vector3d before = left->value + rotation;
-  return 0.5 * (before.dot(information * before) - left->value.dot(information * left->value));
+/// disparities alone. `remaining`: rotation by rows after the compensation.
+double logRatioOfRows(const std::optional<RightRotation>& remaining, const Eigen::Vector3d& rotation) {
+  if (!remaining) return 0.0;
+  const Eigen::Matrix3d information = withRectification(*remaining).inverse();
+  const Eigen::Vector3d before = remaining->value + rotation;
+  return 0.5 * (before.dot(information * before) - remaining->value.dot(information * remaining->value));
 }
 
 /// log(1 + exp(x)), for any x.
@@ -33,7 +33,7 @@ double logOnePlus(double x) {
 
 }  // namespace
 
-std::string ShownRotation::words() const {
+std::string RotationHypothesis::words() const {
   std::ostringstream words;
   words << std::setprecision(2) << "the right camera seems to have turned by " << value.norm() * 180.0 / CV_PI
         << " degrees (" << 1e3 * value.transpose() << " mrad about x, y, z): calibrate again";
@@ -44,14 +44,15 @@ LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assu
     : calibration(options), noise(assumed), assumed_(assumed), delay_sigma_(options.right_delay_sigma) {}
 
 /// Weighs a rotation against errors of rectification and the noise of this rig's rotations.
-ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
-                                       const Eigen::Vector3d& supposed, const Eigen::Matrix3d& turns, double dt) const {
+RotationHypothesis LearntRig::rotationHypothesis(const StereoFeatures& features, const MotionHypothesis& found,
+                                                 const Eigen::Vector3d& compensated, const Eigen::Matrix3d& turns,
+                                                 double dt) const {
   constexpr double kKnock = 0.0175;  // rad (chosen): prior of a knock, a degree
-  ShownRotation shown;
-  if (features.count() < kFewestMeasured) return shown;
+  RotationHypothesis hypothesis;
+  if (features.count() < kFewestMeasured) return hypothesis;
   std::optional<RightRotation> by_disparities;
-  // A minority's motion may be a mover's. With a supposed rotation, more matches and the rows have to confirm it.
-  if (found.isOfMajority() || (found.motion.success && !supposed.isZero())) {
+  // A minority's motion may be a mover's. With a compensated rotation, more matches and the rows have to confirm it.
+  if (found.isOfMajority() || (found.motion.success && !compensated.isZero())) {
     NoiseOptions scaled = assumed_;
     scaled.corner *= noise.scale();
     by_disparities = rotationByDisparities(features.camera, scaled, found.correspondences, found.motion.inliers,
@@ -65,42 +66,42 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
     const Eigen::Matrix3d known = withRectification(*by).inverse();
     information += known, weighted += known * by->value;
   }
-  if (!(information.determinant() > 0.0)) return shown;
+  if (!(information.determinant() > 0.0)) return hypothesis;
   const Eigen::Matrix3d covariance = information.inverse();
   // A right image that is late by d looks rotated by d / dt of the camera's rotation. The map's last pair may be late,
   // too.
   const double late = dt > 0.0 ? delay_sigma_ / dt : 0.0;
-  shown.value = supposed + covariance * weighted;
-  shown.covariance = covariance + late * late * turns + rotation_noise_;
+  hypothesis.value = compensated + covariance * weighted;
+  hypothesis.covariance = covariance + late * late * turns + rotation_noise_;
   const auto log_factor = [&](const Eigen::Matrix3d& prior) {
-    return logBayesFactor<3>(shown.value, shown.covariance.inverse(), prior);
+    return logBayesFactor<3>(hypothesis.value, hypothesis.covariance.inverse(), prior);
   };
   const double knock = kUnsuspected + log_factor(kKnock * kKnock * Eigen::Matrix3d::Identity());
-  const double other_moment = driver_fault_ + log_factor(turns);
-  shown.log_odds = knock - logOnePlus(other_moment);
-  if (!supposed.isZero()) shown.log_odds = std::min(shown.log_odds, logRatioOfRows(by_rows, supposed));
-  shown.other_moment = other_moment - logOnePlus(knock);
-  return shown;
+  const double other_moment = log_prior_of_other_moment_ + log_factor(turns);
+  hypothesis.log_odds = knock - logOnePlus(other_moment);
+  if (!compensated.isZero()) hypothesis.log_odds = std::min(hypothesis.log_odds, logRatioOfRows(by_rows, compensated));
+  hypothesis.log_odds_of_other_moment = other_moment - logOnePlus(knock);
+  return hypothesis;
 }
 
-RigEstimate::Matrix LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
-  const Eigen::Vector3d now = rotation + shown.value, back = now - rotation_before_;
-  const Eigen::Matrix3d covariance = rotation_covariance + shown.covariance;
+RigEstimate::Matrix LearntRig::rotate(const RotationHypothesis& new_rotation, const StereoCamera& camera) {
+  const Eigen::Vector3d now = rotation + new_rotation.value, back = now - rotation_before_;
+  const Eigen::Matrix3d covariance = rotation_covariance + new_rotation.covariance;
   std::swap(rotation, rotation_before_), std::swap(rotation_covariance, covariance_before_);
   if (back.dot((covariance + rotation_covariance).inverse() * back) < noiseGate(3)) {
     // The rig is again as before the last rotation: an error of images, no knock.
-    rotation_noise_ += shown.value * shown.value.transpose();
+    rotation_noise_ += new_rotation.value * new_rotation.value.transpose();
     return RigEstimate::Matrix::Zero();
   }
   rotation = now, rotation_covariance = covariance;
-  return calibration.widen(camera, shown.covariance);
+  return calibration.widen(camera, new_rotation.covariance);
 }
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
-                      const ShownRotation& shown, bool is_confirmed) {
-  driver_fault_ = features.report.refused ? kUnsuspected : driver_fault_ - std::log(2.0);
+                      const RotationHypothesis& new_rotation, bool is_confirmed) {
+  log_prior_of_other_moment_ = features.report.refused ? kUnsuspected : log_prior_of_other_moment_ - std::log(2.0);
   if (is_confirmed) {
-    rotation_noise_ += (1.0 - kUsualMemory) * (shown.value * shown.value.transpose() - rotation_noise_);
+    rotation_noise_ += (1.0 - kUsualMemory) * (new_rotation.value * new_rotation.value.transpose() - rotation_noise_);
     row_pattern.learn(features, measured ? measured->rows : std::vector<RowMotion>());
     noise.learn(found.motion.rms);
     if (found.lasting_square) noise.learnShared(*found.lasting_square);
@@ -113,9 +114,10 @@ void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measur
     readout.add(measured->features, found, measured->since_reference);
   else
     readout.interrupt();
-  if (const auto delay = right_delay.estimate()) calibration.noteRows(RigEstimate::kDelay, delay->value, delay->sigma);
+  if (const auto delay = right_delay.estimate())
+    calibration.updateByRows(RigEstimate::kDelay, delay->value, delay->sigma);
   if (const auto by_rows = row_pattern.rotation())
-    calibration.noteRows(RigEstimate::kRoll, by_rows->value.z(), std::sqrt(withRectification(*by_rows)(2, 2)));
+    calibration.updateByRows(RigEstimate::kRoll, by_rows->value.z(), std::sqrt(withRectification(*by_rows)(2, 2)));
 }
 
 }  // namespace sdvo

@@ -29,11 +29,11 @@ struct MeasuredPair {
 };
 
 /// A new rotation of the right camera, as rows and disparities of one pair imply it.
-struct ShownRotation {
+struct RotationHypothesis {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();       ///< rad
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2
   double log_odds = kUnsuspected;                        ///< that it rotated, against the noise of this rig
-  double other_moment = kUnsuspected;                    ///< log-odds of images of different moments instead
+  double log_odds_of_other_moment = kUnsuspected;        ///< of images of different moments instead
   std::string words() const;
 };
 
@@ -50,26 +50,27 @@ struct LearntRig {
 
   LearntRig(const CalibrationOptions& options, const NoiseOptions& noise);
 
-  /// New rotation of the right camera. `features`: rotated back by the known one and by the `supposed` new one, rad;
-  /// `found`: their motion, if any; `turns`, rad^2: second moment of the camera's rotations over the last two
-  /// intervals, of `dt` s each.
-  ShownRotation shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
-                              const Eigen::Vector3d& supposed, const Eigen::Matrix3d& turns, double dt) const;
+  /// New rotation of the right camera. `features`: rotated back by the known one and by the part `compensated` of the
+  /// new one, rad; `found`: their motion, if any; `turns`, rad^2: second moment of the camera's rotations over the last
+  /// two intervals, of `dt` s each.
+  RotationHypothesis rotationHypothesis(const StereoFeatures& features, const MotionHypothesis& found,
+                                        const Eigen::Vector3d& compensated, const Eigen::Matrix3d& turns,
+                                        double dt) const;
 
   /// Adds a new rotation, and returns how uncertain it leaves the rig. A rotation that undoes the last one counts as
   /// noise of this rig.
-  RigEstimate::Matrix rotate(const ShownRotation& shown, const StereoCamera& camera);
+  RigEstimate::Matrix rotate(const RotationHypothesis& new_rotation, const StereoCamera& camera);
 
   /// Learns from a pair. Refused pairs raise the odds of right images of other moments, unconfirmed ones interrupt the
   /// pairs of delay and readout. `measured` is null without a motion.
   void learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
-             const ShownRotation& shown, bool is_confirmed);
+             const RotationHypothesis& new_rotation, bool is_confirmed);
 
  private:
   NoiseOptions assumed_;
-  /// Log-odds of a right image of another moment. At a refused pair they are those of a knock. Each pair after it
-  /// halves the odds.
-  double driver_fault_ = -std::numeric_limits<double>::infinity();
+  /// Log-odds of a right image of another moment, before its rotation is considered. At a refused pair they are those
+  /// of a knock. Each pair after it halves the odds.
+  double log_prior_of_other_moment_ = -std::numeric_limits<double>::infinity();
   double delay_sigma_;                                         ///< s: standard deviation of the delay of one pair
   Eigen::Matrix3d rotation_noise_ = Eigen::Matrix3d::Zero();   ///< rad^2: second moment of confirmed pairs' rotations
   Eigen::Vector3d rotation_before_ = Eigen::Vector3d::Zero();  ///< before the last rotate()

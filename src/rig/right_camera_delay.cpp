@@ -53,22 +53,22 @@ Synchronised synchronised(const StereoFeatures& features, int i, double delay, c
 
 /// Mean velocity during the delay, from that at the pair and the means over the intervals before and after it.
 Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const Vector6d& at, const Vector6d& after) {
-  const double share = std::min(std::abs(delay) / dt, 1.0);
-  return at + share * ((delay < 0.0 ? before : after) - at);
+  const double ratio = std::min(std::abs(delay) / dt, 1.0);
+  return at + ratio * ((delay < 0.0 ? before : after) - at);
 }
 
 /// Mean squared residual (px^2, each cut off) of rows against a right image that is late by `delay` and lower by a
 /// constant.
 double misfit(const std::vector<RowMotion>& rows, double delay) {
   constexpr double kCut = 2.0 * RowDelay::kKernel;  // px: larger residuals are wrong matches
-  std::vector<double> rest;
-  rest.reserve(rows.size());
-  for (const RowMotion& row : rows) rest.push_back(row.dv - delay * row.velocity);
-  std::vector<double> sorted = rest;
+  std::vector<double> residuals;
+  residuals.reserve(rows.size());
+  for (const RowMotion& row : rows) residuals.push_back(row.dv - delay * row.velocity);
+  std::vector<double> sorted = residuals;
   const double middle = median(sorted);
   double sum = 0.0;
-  for (const double each : rest) sum += std::min((each - middle) * (each - middle), kCut * kCut);
-  return sum / static_cast<double>(rest.size());
+  for (const double each : residuals) sum += std::min((each - middle) * (each - middle), kCut * kCut);
+  return sum / static_cast<double>(residuals.size());
 }
 
 /// Ratio of the rows' apparent motion during `delay` that is error of the left image. Velocity and dv share this error,
@@ -98,13 +98,13 @@ double logRatioOfDelay(const std::vector<RowMotion>& rows, double delay, double 
 
 RightCameraDelay::RightCameraDelay() : rows_(RowDelay::kMemory, kLeastTurning, kSamePoints) {}
 
-void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, double row_error) {
+void RightCameraDelay::updateOtherPair(const std::vector<RowMotion>& rows, double dt, double row_error) {
   if (rows.size() < kFewestMeasured || !(dt > 0.0)) return;
-  for (auto* other : {&earlier_, &later_}) {
+  for (auto* other : {&log_odds_earlier_, &log_odds_later_}) {
     // Evidence fades without renewal, because a standing camera gives none.
     const double carried = kUnsuspected + kUsualMemory * (*other - kUnsuspected);
-    *other =
-        std::clamp(carried + logRatioOfDelay(rows, other == &earlier_ ? -dt : dt, row_error), kUnsuspected, kCertain);
+    *other = std::clamp(carried + logRatioOfDelay(rows, other == &log_odds_earlier_ ? -dt : dt, row_error),
+                        kUnsuspected, kCertain);
   }
 }
 
@@ -123,7 +123,7 @@ void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Ve
 }
 
 RightCameraDelay::OtherPair RightCameraDelay::otherPair(double dt) const {
-  return earlier_ > later_ ? OtherPair{-dt, earlier_} : OtherPair{dt, later_};
+  return log_odds_earlier_ > log_odds_later_ ? OtherPair{-dt, log_odds_earlier_} : OtherPair{dt, log_odds_later_};
 }
 
 std::string RightCameraDelay::OtherPair::words() const {
@@ -148,7 +148,7 @@ void RightCameraDelay::addRows(double dt, double known) {
   for (int i = 0; i < features.count(); ++i) {
     const Synchronised step = sdvo::synchronised(features, i, delay, during);
     const RightFlow turning = rightFlow(features.camera, slow, features.u[i] - features.disparity[i], features.v[i]);
-    rows.push_back({RowDelay::cellOf(features.u[i], features.v[i], features.camera.width, features.camera.height),
+    rows.push_back({RowDelay::partOf(features.u[i], features.v[i], features.camera.width, features.camera.height),
                     features.dv[i] - stamped * step.flow.y(), step.flow.y(), turning.far.y(), step.disparity});
   }
   rows_.add(rows);

@@ -26,7 +26,7 @@ class RightCameraDelay {
 
   /// Updates the evidence that right images are those of the previous or next pair, `dt` s apart. `row_error`, px:
   /// standard deviation of a row in the left image.
-  void watch(const std::vector<RowMotion>& rows, double dt, double row_error);
+  void updateOtherPair(const std::vector<RowMotion>& rows, double dt, double row_error);
 
   /// Adds a pair before compensation, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s
   /// before it.
@@ -59,7 +59,7 @@ class RightCameraDelay {
   RowDelay rows_;
   std::deque<Pair> pairs_;  ///< the last ones
   /// Log-odds that the right image is that of the previous, or of the next pair.
-  double earlier_ = kUnsuspected, later_ = kUnsuspected;
+  double log_odds_earlier_ = kUnsuspected, log_odds_later_ = kUnsuspected;
 };
 
 }  // namespace sdvo

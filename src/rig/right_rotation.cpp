@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "../common/statistics.hpp"
 #include "../motion/pose_problem.hpp"
@@ -16,7 +17,9 @@
 namespace sdvo {
 namespace {
 
-constexpr int kUnknowns = 9;  // a left perturbation of the motion (m, rad), and the rotation
+constexpr int kMotion = 6, kUnknowns = kMotion + 3;  // a left perturbation of the motion (m, rad), and the rotation
+using Vector = Eigen::Matrix<double, kUnknowns, 1>;
+using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
 /// Noise of the equations, and where they are linearised.
 struct RotationEquations {
@@ -76,6 +79,57 @@ struct AddRotationEquations {
   }
 };
 
+struct Inliers {
+  const StereoCamera& camera;
+  double corner_sigma, disparity_sigma;  ///< px
+  CorrespondenceArrays arrays;
+  std::vector<int> parts;  ///< of the image
+};
+
+/// Hessian, and gradients by part of the image.
+struct Linearisation {
+  Matrix hessian;
+  std::array<Vector, RowDelay::kParts> gradients;
+
+  Vector gradient() const {
+    Vector sum = Vector::Zero();
+    for (const Vector& of_part : gradients) sum += of_part;
+    return sum;
+  }
+
+  /// Covariance of the rotation: sandwich of the gradients between the Hessian's `inverse`.
+  Eigen::Matrix3d sandwich(const Matrix& inverse) const {
+    Matrix meat = hessian;  // lower bound: correlated errors of a part may cancel by chance
+    for (const Vector& of_part : gradients) meat += of_part * of_part.transpose();
+    return (inverse * meat * inverse).bottomRightCorner<3, 3>();
+  }
+};
+
+Linearisation linearise(const Inliers& inliers, const Eigen::Isometry3d& T, const Eigen::Vector3d& rotation) {
+  const StereoCamera& camera = inliers.camera;
+  const std::ptrdiff_t stride = CorrespondenceArrays::roundedUp(inliers.arrays.count());
+  const RotationEquations equations{
+      Projection(camera, T),
+      {1.0 / inliers.corner_sigma, 1.0 / inliers.corner_sigma, 1.0 / inliers.disparity_sigma},
+      {rotation.x(), rotation.y(), rotation.z()}};
+  DoubleLanes sums[kUnknowns * kUnknowns] = {};
+  std::vector<double> columns(static_cast<std::size_t>(kUnknowns * stride));
+  runKernel<AddRotationEquations>(&equations, inliers.arrays.values(), stride, inliers.arrays.count(), +sums,
+                                  columns.data());
+  Linearisation result;
+  result.hessian.setIdentity();  // prior of a baseline and 1 rad, for what the view does not constrain
+  result.hessian.diagonal().head<3>() /= camera.baseline * camera.baseline;
+  for (int i = 0; i < kUnknowns; ++i)
+    for (int j = i; j < kUnknowns; ++j)
+      result.hessian(i, j) += total(sums[kUnknowns * i + j]), result.hessian(j, i) = result.hessian(i, j);
+  result.gradients.fill(Vector::Zero());
+  for (std::size_t k = 0; k < inliers.parts.size(); ++k)
+    for (int i = 0; i < kUnknowns; ++i)
+      result.gradients[static_cast<std::size_t>(inliers.parts[k])][i] +=
+          columns[static_cast<std::size_t>(i * stride) + k];
+  return result;
+}
+
 }  // namespace
 
 Eigen::Matrix<double, 2, 3> rotationJacobian(const StereoCamera& camera, double u, double v) {
@@ -117,56 +171,33 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
                                                    const std::vector<int>& inliers,
                                                    const Eigen::Isometry3d& T_current_reference) {
   constexpr double kSmall = 0.01;  // squared standard deviations (chosen): equations from before such a step serve
-  constexpr int kSteps = 3, kMotion = 6;
-  using Vector = Eigen::Matrix<double, kUnknowns, 1>;
-  using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+  constexpr int kSteps = 3;
   if (static_cast<int>(inliers.size()) < kFewestMeasured) return std::nullopt;
-  const double of_disparity = std::hypot(noise.disparity, noise.common_disparity);
+  const double disparity_sigma = std::hypot(noise.disparity, noise.common_disparity);
   std::vector<Correspondence> some;
   std::vector<int> parts;
   some.reserve(inliers.size()), parts.reserve(inliers.size());
   for (const int i : inliers) {
     const Correspondence& c = some.emplace_back(correspondences[static_cast<std::size_t>(i)]);
-    parts.push_back(RowDelay::cellOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height));
+    parts.push_back(RowDelay::partOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height));
   }
-  const CorrespondenceArrays arrays(some);
-  const std::ptrdiff_t stride = CorrespondenceArrays::roundedUp(arrays.count());
-  std::vector<double> columns(static_cast<std::size_t>(kUnknowns * stride));
-
+  const Inliers observed{camera, noise.corner, disparity_sigma, CorrespondenceArrays(some), std::move(parts)};
   Eigen::Isometry3d T = T_current_reference;
   RightRotation found;
-  Matrix hessian;
-  std::array<Vector, RowDelay::kParts> gradients;
-  for (int step = 0;; ++step) {
-    const RotationEquations equations{Projection(camera, T),
-                                      {1.0 / noise.corner, 1.0 / noise.corner, 1.0 / of_disparity},
-                                      {found.value.x(), found.value.y(), found.value.z()}};
-    DoubleLanes sums[kUnknowns * kUnknowns] = {};
-    runKernel<AddRotationEquations>(&equations, arrays.values(), stride, arrays.count(), +sums, columns.data());
-    hessian.setIdentity();  // prior of a baseline and 1 rad, for what the view does not constrain
-    hessian.diagonal().head<3>() /= camera.baseline * camera.baseline;
-    for (int i = 0; i < kUnknowns; ++i)
-      for (int j = i; j < kUnknowns; ++j)
-        hessian(i, j) += total(sums[kUnknowns * i + j]), hessian(j, i) = hessian(i, j);
-    gradients.fill(Vector::Zero());
-    for (std::size_t k = 0; k < parts.size(); ++k)
-      for (int i = 0; i < kUnknowns; ++i)
-        gradients[static_cast<std::size_t>(parts[k])][i] += columns[static_cast<std::size_t>(i * stride) + k];
-    if (step == kSteps) break;
-    Vector gradient = Vector::Zero();
-    for (const Vector& of_part : gradients) gradient += of_part;
-    const Vector moved = hessian.ldlt().solve(gradient);
-    if (!moved.allFinite()) return std::nullopt;
-    T = expSE3(Vector6d(moved.head<kMotion>())) * T;
-    found.value += moved.tail<3>();
-    if (gradient.dot(moved) < kSmall) break;
+  Linearisation equations = linearise(observed, T, found.value);
+  for (int step = 0; step < kSteps; ++step) {
+    const Vector gradient = equations.gradient();
+    const Vector step_of_all = equations.hessian.ldlt().solve(gradient);
+    if (!step_of_all.allFinite()) return std::nullopt;
+    T = expSE3(Vector6d(step_of_all.head<kMotion>())) * T;
+    found.value += step_of_all.tail<3>();
+    if (gradient.dot(step_of_all) < kSmall) break;
+    equations = linearise(observed, T, found.value);
   }
-  Matrix meat = hessian;  // lower bound: correlated errors of a part may cancel by chance
-  for (const Vector& of_part : gradients) meat += of_part * of_part.transpose();
-  const Matrix inverse = hessian.inverse();
-  found.covariance = (inverse * meat * inverse).bottomRightCorner<3, 3>();
-  found.spread =
-      static_cast<double>(inliers.size()) / (3.0 * of_disparity * of_disparity) * inverse.bottomRightCorner<3, 3>();
+  const Matrix inverse = equations.hessian.inverse();
+  found.covariance = equations.sandwich(inverse);
+  found.spread = static_cast<double>(inliers.size()) / (3.0 * disparity_sigma * disparity_sigma) *
+                 inverse.bottomRightCorner<3, 3>();
   return found;
 }
 

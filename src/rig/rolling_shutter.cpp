@@ -11,9 +11,9 @@
 namespace sdvo {
 namespace {
 
-/// Ratio by which a rate's expected value (variance) and its value by rows are weighed.
+/// Kalman gain of the rate by rows, for an expected rate with this variance, rad^2/s^2.
 Eigen::Matrix3d gainOfRows(const RateByRows& rate, double variance) {
-  constexpr double kWithMap = 2.0;  // ratio to the pair's own variance (chosen): the map errs as much
+  constexpr double kWithMap = 2.0;  // factor on the pair's own variance (chosen): the map errs as much
   const Eigen::Matrix3d expected = variance * Eigen::Matrix3d::Identity();
   return expected * (expected + kWithMap * rate.covariance).inverse();
 }
@@ -40,8 +40,8 @@ bool RollingShutter::isNegligible(const StereoCamera& camera, const Vector6d& di
   return 0.5 * std::abs(readout_) * camera.fx * difference.tail<3>().norm() < kNegligible;
 }
 
-/// Least squares over the errors of pose and rate. In a row at time t, the error of the rate turns the pose by -t times
-/// it.
+/// Least squares over the errors of pose and rate. A row that is taken t s after the stamp was moved by t * rate, so an
+/// error of the rate turns its pose by -t * error.
 std::optional<RateByRows> RollingShutter::rateByRows(const RolledPair& pair, const MotionHypothesis& found) const {
   using Matrix = Eigen::Matrix<double, 9, 9>;
   using Vector = Eigen::Matrix<double, 9, 1>;
@@ -73,8 +73,8 @@ std::optional<RateByRows> RollingShutter::rateByRows(const RolledPair& pair, con
   const RateByRows rate{pair.velocity.tail<3>() + error.tail<3>(),
                         Matrix(information.inverse()).bottomRightCorner<3, 3>(),
                         information.topLeftCorner<6, 6>().ldlt().solve(information.topRightCorner<6, 3>())};
-  const bool is_constrained = rate.value.allFinite() && rate.covariance.allFinite() && rate.of_motion.allFinite() &&
-                              rate.covariance.diagonal().minCoeff() > 0.0;
+  const bool is_constrained = rate.value.allFinite() && rate.covariance.allFinite() &&
+                              rate.motion_by_rate.allFinite() && rate.covariance.diagonal().minCoeff() > 0.0;
   return is_constrained ? std::optional(rate) : std::nullopt;
 }
 
@@ -83,35 +83,37 @@ double RollingShutter::varianceAt(const RolledPair& pair) const {
 }
 
 Vector6d RollingShutter::velocityAt(const RolledPair& pair) const {
-  Vector6d velocity = pair.mean.value_or(Vector6d::Zero());
-  if (pair.mean && pair.mean_before) velocity += 0.25 * (*pair.mean - *pair.mean_before);
+  Vector6d velocity = pair.mean_velocity.value_or(Vector6d::Zero());
+  if (pair.mean_velocity && pair.mean_velocity_before)
+    velocity += 0.25 * (*pair.mean_velocity - *pair.mean_velocity_before);
   if (!pair.rate_by_rows) return velocity;
-  const Eigen::Matrix3d gain =
-      pair.mean ? gainOfRows(*pair.rate_by_rows, varianceAt(pair)) : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d gain = pair.mean_velocity ? gainOfRows(*pair.rate_by_rows, varianceAt(pair))
+                                                  : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
   velocity.tail<3>() += gain * (pair.rate_by_rows->value - velocity.tail<3>());
   return velocity;
 }
 
 Vector6d RollingShutter::velocityBetween(const RolledPair& pair, const Vector6d& next) const {
-  return pair.mean ? Vector6d(0.5 * (*pair.mean + next)) : next;
+  return pair.mean_velocity ? Vector6d(0.5 * (*pair.mean_velocity + next)) : next;
 }
 
-Matrix6d RollingShutter::momentOf(const RolledPair& pair) const {
-  if (!pair.mean || !pair.rate_by_rows) return Matrix6d::Zero();
+Matrix6d RollingShutter::covarianceByVelocity(const RolledPair& pair) const {
+  if (!pair.mean_velocity || !pair.rate_by_rows) return Matrix6d::Zero();
   const double variance = varianceAt(pair);
   const Eigen::Matrix3d covariance =
       variance * (Eigen::Matrix3d::Identity() - gainOfRows(*pair.rate_by_rows, variance));
-  const Matrix6d moment = pair.rate_by_rows->of_motion * covariance * pair.rate_by_rows->of_motion.transpose();
+  const Matrix6d moment =
+      pair.rate_by_rows->motion_by_rate * covariance * pair.rate_by_rows->motion_by_rate.transpose();
   return 0.5 * (moment + moment.transpose());
 }
 
 /// The second difference of three mean velocities has the variance a^2 dt.
 void RollingShutter::learn(const RolledPair& pair, const Vector6d& next) {
-  if (!pair.mean || !pair.mean_before) return;
+  if (!pair.mean_velocity || !pair.mean_velocity_before) return;
   constexpr double kMemory = 1.0 / (1.0 - kUsualMemory);  // pairs
-  const Eigen::Vector3d difference = (next - 2.0 * *pair.mean + *pair.mean_before).tail<3>();
-  learnt_ = std::min(learnt_ + 1.0, kMemory);
-  acceleration_square_ += (difference.squaredNorm() / (3.0 * pair.dt) - acceleration_square_) / (1.0 + learnt_);
+  const Eigen::Vector3d difference = (next - 2.0 * *pair.mean_velocity + *pair.mean_velocity_before).tail<3>();
+  learnt_pairs_ = std::min(learnt_pairs_ + 1.0, kMemory);
+  acceleration_square_ += (difference.squaredNorm() / (3.0 * pair.dt) - acceleration_square_) / (1.0 + learnt_pairs_);
 }
 
 }  // namespace sdvo

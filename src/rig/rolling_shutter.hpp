@@ -18,35 +18,37 @@ inline double rowTime(const StereoCamera& camera, double v) {
 struct RateByRows {
   Eigen::Vector3d value;
   Eigen::Matrix3d covariance;  ///< of the pair's noise alone
-  /// Derivative of the pair's motion (its left perturbation, m and rad) by the rate that its rows are moved by.
-  Eigen::Matrix<double, 6, 3> of_motion;
+  /// Derivative of the pair's motion (its left perturbation, m and rad) by the rate with which rows are moved.
+  Eigen::Matrix<double, 6, 3> motion_by_rate;
 };
 
 /// A pair as a rolling shutter took it, with the camera's velocities in its own frame, m/s and rad/s.
 struct RolledPair {
   StereoFeatures features;
-  double readout = 0.0;                   ///< s, see RollingShutter
-  Vector6d velocity = Vector6d::Zero();   ///< at the stamp, by which rows are moved there
-  std::optional<Vector6d> mean{};         ///< over the interval before the pair; none if it is unknown
-  std::optional<Vector6d> mean_before{};  ///< over the interval before that one
-  double dt = 0.0;                        ///< s, of the interval before the pair
+  double readout = 0.0;                            ///< s, see RollingShutter
+  Vector6d velocity = Vector6d::Zero();            ///< at the stamp; rows are moved by it
+  std::optional<Vector6d> mean_velocity{};         ///< over the interval before; none if unknown
+  std::optional<Vector6d> mean_velocity_before{};  ///< over the interval before that one
+  double dt = 0.0;                                 ///< s, of the interval before
   std::optional<RateByRows> rate_by_rows{};
 
-  /// Features without measured velocities.
-  void forgetMotion() { mean.reset(), mean_before.reset(), rate_by_rows.reset(); }
+  /// Keeps the features only: no velocity is measured.
+  void forgetMotion() { mean_velocity.reset(), mean_velocity_before.reset(), rate_by_rows.reset(); }
 };
 
-/// Rows that are taken one after the other: the middle one at the stamp, left and right in step.
+/// Compensation of a rolling shutter. Its rows are taken one after the other: the middle one at the stamp, left and
+/// right ones at the same time.
 ///
 /// Motions between pairs are mean velocities. Under white acceleration of the variance a^2 per second, the velocity at
-/// a pair is the mean before it plus a quarter of its last change, with the variance 7/24 a^2 dt. Once the next motion
-/// is known, it is the mean of both, with a^2 dt / 6. Rows measure the rate at the pair itself, also in a tremor that
-/// is faster than pairs. They measure it against the map, though: if pairs of the map were moved by it, its error would
-/// grow from pair to pair. So only the newest pair uses it, until the next motion is known.
+/// a pair is the mean before it plus a quarter of the last change of the mean, with the variance 7/24 a^2 dt. Once the
+/// next motion is known, the velocity is the mean of both motions', with the variance a^2 dt / 6.
+/// Rows measure the rate at the pair itself, even in a tremor faster than pairs, but against the map. If pairs of the
+/// map were moved by this rate, its error would grow from pair to pair. So only the newest pair uses it, until the next
+/// motion is known.
 class RollingShutter {
  public:
   /// `readout`, s: from the first row to the last; negative if the last row is the first one taken.
-  /// `rotation_acceleration`: a, rad/s within a second, until motions show it.
+  /// `rotation_acceleration`: a, standard deviation of the rate's change in 1 s, rad/s, until motions are learnt.
   RollingShutter(double readout, double rotation_acceleration)
       : readout_(readout), acceleration_square_(rotation_acceleration * rotation_acceleration) {}
 
@@ -60,7 +62,7 @@ class RollingShutter {
   /// Whether a difference between two velocities moves no row by more than a part of its noise.
   bool isNegligible(const StereoCamera& camera, const Vector6d& difference) const;
 
-  /// By the inliers of the motion that was found with asGlobal(`pair`). None if they do not constrain it.
+  /// Rate by the inliers of the motion that was found with asGlobal(`pair`). None if they do not constrain it.
   std::optional<RateByRows> rateByRows(const RolledPair& pair, const MotionHypothesis& found) const;
 
   /// Velocity at the newest pair. Without a known motion the translation is unknown, and zero.
@@ -68,17 +70,18 @@ class RollingShutter {
   /// The same once the mean velocity `next` over the interval after the pair is known.
   Vector6d velocityBetween(const RolledPair& pair, const Vector6d& next) const;
   /// Covariance of the pair's motion, m and rad, by the error of velocityAt().
-  Matrix6d momentOf(const RolledPair& pair) const;
+  Matrix6d covarianceByVelocity(const RolledPair& pair) const;
 
   /// Adds a pair, and the mean velocity after it, to the estimate of a.
   void learn(const RolledPair& pair, const Vector6d& next);
 
  private:
+  /// Variance of the rate of velocityAt() without rows, rad^2/s^2.
   double varianceAt(const RolledPair& pair) const;
 
   double readout_;
   double acceleration_square_;  ///< a^2, rad^2/s^3
-  double learnt_ = 0.0;         ///< number of learn() calls, bounded
+  double learnt_pairs_ = 0.0;   ///< number of learn() calls, bounded
 };
 
 }  // namespace sdvo

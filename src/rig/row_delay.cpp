@@ -22,27 +22,27 @@ Eigen::Vector2d instruments(const Eigen::Vector3d& motion) {
 
 }  // namespace
 
-int RowDelay::cellOf(double u, double v, int width, int height) {
+int RowDelay::partOf(double u, double v, int width, int height) {
   // Clamped before it becomes an integer, which a position far outside of the image overflows.
-  const auto part = [](double position, int size, int count) {
+  const auto index = [](double position, int size, int count) {
     return static_cast<int>(std::clamp(position * count / size, 0.0, count - 1.0));
   };
-  return part(v, height, kRows) * kColumns + part(u, width, kColumns);
+  return index(v, height, kRows) * kColumns + index(u, width, kColumns);
 }
 
-double RowDelay::Estimate::proved() const {
+double RowDelay::Estimate::significantValue() const {
   return std::copysign(std::sqrt(std::max(value * value - kSquare * sigma * sigma, 0.0)), value);
 }
 
-RowDelay::Fit RowDelay::fit(const Cells& cells) {
+RowDelay::Fit RowDelay::fit(const Parts& parts) {
   Fit fit;
   Eigen::Vector2d product = Eigen::Vector2d::Zero();
-  for (const Sums& cell : cells) {
-    if (!(cell.weight > 0.0)) continue;
-    const Eigen::Matrix3d square = cell.square - cell.motion * cell.meanMotion().transpose();
+  for (const Sums& part : parts) {
+    if (!(part.weight > 0.0)) continue;
+    const Eigen::Matrix3d square = part.square - part.motion * part.meanMotion().transpose();
     fit.information.row(0) += square.row(0).tail<2>();
     fit.information.row(1) += square.row(2).tail<2>();
-    product += instruments(cell.product - cell.motion * cell.meanDv());
+    product += instruments(part.product - part.motion * part.meanDv());
   }
   constexpr double kSteady = 1e-6;  // keeps the equations solvable where all disparities are equal
   fit.information.diagonal().array() += kSteady;
@@ -58,6 +58,37 @@ void RowDelay::Sums::add(double w, const Eigen::Vector3d& moved, double lower) {
   product += w * lower * moved;
 }
 
+/// Sums over the previous pairs, with the weight that a new pair leaves them.
+RowDelay::Parts RowDelay::forgotten() const {
+  Parts past = parts_;
+  for (Sums& part : past) {
+    part.weight *= memory_, part.dv *= memory_;
+    part.motion *= memory_, part.square *= memory_, part.product *= memory_;
+  }
+  return past;
+}
+
+RowDelay::Parts RowDelay::sumsOf(const std::vector<Sample>& pair, const std::vector<double>& weights) {
+  Parts sums;
+  for (std::size_t i = 0; i < pair.size(); ++i)
+    sums[static_cast<std::size_t>(pair[i].part)].add(weights[i], motionOf(pair[i]), pair[i].dv);
+  return sums;
+}
+
+double RowDelay::Sums::residual(const Eigen::Vector2d& value, const Eigen::Vector3d& moved, double lower) const {
+  return lower - meanDv() - value.dot(regressors(moved - meanMotion()));
+}
+
+/// Sum over a pair's parts of instruments times residual.
+Eigen::Vector2d RowDelay::gradientOf(const Parts& now, const Eigen::Vector2d& value) const {
+  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+  for (std::size_t part = 0; part < now.size(); ++part)
+    if (now[part].weight > 0.0)
+      gradient += now[part].weight * parts_[part].residual(value, now[part].meanMotion(), now[part].meanDv()) *
+                  instruments(now[part].meanMotion() - parts_[part].meanMotion());
+  return gradient;
+}
+
 /// Each part of the pair is one observation: the mean of its samples, weighted by a Huber kernel. Differences within a
 /// part are not used: on a road they have the same pattern in all pairs, as the rectification's error has.
 void RowDelay::add(const std::vector<Sample>& pair) {
@@ -66,38 +97,31 @@ void RowDelay::add(const std::vector<Sample>& pair) {
   for (const Sample& row : pair) square += row.turning * row.turning;
   if (!(square > least_turning_ * least_turning_ * static_cast<double>(pair.size()))) return;
 
-  Cells past = cells_;
-  for (Sums& cell : past) {
-    cell.weight *= memory_, cell.dv *= memory_;
-    cell.motion *= memory_, cell.square *= memory_, cell.product *= memory_;
-  }
+  const Parts past = forgotten();
   std::vector<double> weights(pair.size(), 1.0);
   Eigen::Vector2d gradient;
   for (int pass = 0; pass < kReweightings; ++pass) {
-    Cells now;
-    for (std::size_t i = 0; i < pair.size(); ++i)
-      now[static_cast<std::size_t>(pair[i].cell)].add(weights[i], motionOf(pair[i]), pair[i].dv);
-    cells_ = past;
-    for (std::size_t cell = 0; cell < now.size(); ++cell)
-      if (now[cell].weight > 0.0) cells_[cell].add(now[cell].weight, now[cell].meanMotion(), now[cell].meanDv());
-    const Eigen::Vector2d value = fit(cells_).value;
-    const auto rest = [&](const Sums& cell, const Eigen::Vector3d& motion, double dv) {
-      return dv - cell.meanDv() - value.dot(regressors(motion - cell.meanMotion()));
-    };
-    gradient.setZero();
-    for (std::size_t cell = 0; cell < now.size(); ++cell)
-      if (now[cell].weight > 0.0)
-        gradient += now[cell].weight * rest(cells_[cell], now[cell].meanMotion(), now[cell].meanDv()) *
-                    instruments(now[cell].meanMotion() - cells_[cell].meanMotion());
+    const Parts now = sumsOf(pair, weights);
+    parts_ = past;
+    for (std::size_t part = 0; part < now.size(); ++part)
+      if (now[part].weight > 0.0) parts_[part].add(now[part].weight, now[part].meanMotion(), now[part].meanDv());
+    const Eigen::Vector2d value = fit(parts_).value;
+    gradient = gradientOf(now, value);
     for (std::size_t i = 0; i < pair.size(); ++i) {
-      const Sums& cell = cells_[static_cast<std::size_t>(pair[i].cell)];
-      weights[i] = std::min(1.0, kKernel / std::max(std::abs(rest(cell, motionOf(pair[i]), pair[i].dv)), 1e-9));
+      const Sums& part = parts_[static_cast<std::size_t>(pair[i].part)];
+      const double residual = std::abs(part.residual(value, motionOf(pair[i]), pair[i].dv));
+      weights[i] = std::min(1.0, kKernel / std::max(residual, 1e-9));
     }
   }
+  addToBlock(gradient);
+}
+
+/// Adds a pair's gradient to its block. Once the block is complete, its gradient's square joins the sum.
+void RowDelay::addToBlock(const Eigen::Vector2d& gradient) {
   block_ += gradient;
   if (++pairs_ % pairs_of_block_ != 0) return;
   const double memory = std::pow(memory_, pairs_of_block_);
-  spread_ = memory * memory * spread_ + block_ * block_.transpose();
+  gradient_squares_ = memory * memory * gradient_squares_ + block_ * block_.transpose();
   blocks_ = memory * blocks_ + 1.0;
   block_.setZero();
 }
@@ -105,11 +129,11 @@ void RowDelay::add(const std::vector<Sample>& pair) {
 std::optional<RowDelay::Estimate> RowDelay::estimate() const {
   const double freedom = blocks_ - 2.0;
   if (!(freedom > 0.0)) return std::nullopt;
-  const Fit fit = this->fit(cells_);
+  const Fit fit = this->fit(parts_);
   const Eigen::Matrix2d inverse = fit.information.inverse();
   // The spread of few blocks is uncertain: Student's distribution, by Wallace's bound of its quantiles.
   const double few = freedom / kSquare * std::expm1(kSquare / freedom);
-  const Estimate estimate{fit.value[0], std::sqrt(few * (inverse * spread_ * inverse.transpose())(0, 0))};
+  const Estimate estimate{fit.value[0], std::sqrt(few * (inverse * gradient_squares_ * inverse.transpose())(0, 0))};
   if (!(estimate.sigma < kFail)) return std::nullopt;
   return estimate;
 }

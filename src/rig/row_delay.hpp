@@ -14,7 +14,7 @@ namespace sdvo {
 struct RowMotion {
   double velocity;  ///< down in the left image, px/s
   double dv;        ///< v_right - v_left beyond a sound RowPattern and the known delay, px
-  int part;         ///< of the image (RowDelay::cellOf)
+  int part;         ///< of the image (RowDelay::partOf)
 };
 
 /// Delay of a rig's right images, from rows. In a late image, a point that moves down at v' px/s is v' * delay px
@@ -28,25 +28,26 @@ class RowDelay {
   static constexpr double kKernel = 0.5;    ///< px (chosen): of Huber's kernel; errors of healthy rows are smaller
   static constexpr double kSquare = noiseGate(1);  ///< squared standard deviations that chance explains
   /// Delays to warn of, and to fail at, s. 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px. Synchronous
-  /// rigs have 0.2 ms at most (proved(), twelve drives). 10 ms is 3.7 px at 100 deg/s and f = 212 px: beyond 3 m,
-  /// disparities of a baseline of 5 cm are then negative.
+  /// rigs have 0.2 ms at most (significantValue(), twelve drives). 10 ms is 3.7 px at 100 deg/s and f = 212 px: beyond
+  /// 3 m, disparities of a baseline of 5 cm are then negative.
   static constexpr double kWarn = 0.002, kFail = 0.01;
 
   /// Rows of a feature.
   struct Sample {
-    int cell;          ///< part of the image, row by row
-    double dv;         ///< v_right - v_left, px
-    double velocity;   ///< of its row in the right image, px/s
-    double turning;    ///< instrument: part of the velocity by slow rotation, else all of it, px/s
+    int part;         ///< of the image, row by row
+    double dv;        ///< v_right - v_left, px
+    double velocity;  ///< of its row in the right image, px/s
+    /// px/s: instrument, the row's velocity by slow rotations; where these are unknown, its whole velocity.
+    double turning;
     double disparity;  ///< px
   };
-  static int cellOf(double u, double v, int width, int height);
+  static int partOf(double u, double v, int width, int height);
 
   struct Estimate {
     double value, sigma;  ///< s
 
     /// Its significant part, s: the root of value^2 - kSquare * sigma^2 with the sign of `value`, or 0.
-    double proved() const;
+    double significantValue() const;
   };
 
   /// `memory`: factor on the weight of previous pairs with each new pair. A pair is left out if its instrument is below
@@ -71,8 +72,10 @@ class RowDelay {
     void add(double weight, const Eigen::Vector3d& motion, double dv);
     Eigen::Vector3d meanMotion() const { return motion / weight; }
     double meanDv() const { return dv / weight; }
+    /// Of dv after the regression on motion by `value`, px.
+    double residual(const Eigen::Vector2d& value, const Eigen::Vector3d& motion, double dv) const;
   };
-  using Cells = std::array<Sums, kParts>;
+  using Parts = std::array<Sums, kParts>;
 
   /// Regression of dv on velocity and disparity, all less the means of their part. The factor of the velocity is the
   /// delay, s. The instrument of the velocity is its part by rotations. In a translation, velocity and rectification
@@ -81,13 +84,18 @@ class RowDelay {
     Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
     Eigen::Vector2d value = Eigen::Vector2d::Zero();
   };
-  static Fit fit(const Cells& cells);
+  static Fit fit(const Parts& parts);
+
+  Parts forgotten() const;
+  static Parts sumsOf(const std::vector<Sample>& pair, const std::vector<double>& weights);
+  Eigen::Vector2d gradientOf(const Parts& now, const Eigen::Vector2d& value) const;
+  void addToBlock(const Eigen::Vector2d& gradient);
 
   double memory_, least_turning_;
   int pairs_of_block_;
-  Cells cells_;
-  Eigen::Matrix2d spread_ = Eigen::Matrix2d::Zero();  ///< sum of squared gradients of blocks
-  Eigen::Vector2d block_ = Eigen::Vector2d::Zero();   ///< gradient of the block that has begun
+  Parts parts_;
+  Eigen::Matrix2d gradient_squares_ = Eigen::Matrix2d::Zero();  ///< sum over blocks
+  Eigen::Vector2d block_ = Eigen::Vector2d::Zero();             ///< gradient of the block that has begun
   int pairs_ = 0;
   double blocks_ = 0.0;
 };

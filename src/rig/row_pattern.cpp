@@ -11,9 +11,9 @@
 namespace sdvo {
 namespace {
 
-std::size_t partOf(const StereoFeatures& features, int i) {
+std::size_t partOfFeature(const StereoFeatures& features, int i) {
   const StereoCamera& camera = features.camera;
-  return static_cast<std::size_t>(RowDelay::cellOf(features.u[i], features.v[i], camera.width, camera.height));
+  return static_cast<std::size_t>(RowDelay::partOf(features.u[i], features.v[i], camera.width, camera.height));
 }
 
 }  // namespace
@@ -23,7 +23,7 @@ RowPattern::Parts RowPattern::partsOf(const StereoFeatures& features) {
   Parts parts;
   std::array<std::vector<double>, RowDelay::kParts> dv;
   for (int i = 0; i < features.count(); ++i) {
-    const std::size_t p = partOf(features, i);
+    const std::size_t p = partOfFeature(features, i);
     dv[p].push_back(features.dv[i]);
     parts[p].effect += rotationJacobian(features.camera, features.u[i] - features.disparity[i], features.v[i]).row(1);
   }
@@ -62,7 +62,7 @@ bool RowPattern::isOfOtherPairs(double dt) const {
 }
 
 double RowPattern::change(const StereoFeatures& features, int i) const {
-  return features.dv[i] - parts_[partOf(features, i)].dv;
+  return features.dv[i] - parts_[partOfFeature(features, i)].dv;
 }
 
 std::optional<RightRotation> RowPattern::rotation() const {

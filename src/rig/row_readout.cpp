@@ -14,15 +14,16 @@ namespace {
 
 constexpr std::size_t kAround = 4;  // pairs before and after one, whose mean rates give the slow rate there
 
-/// How a feature's position (u_left, v_left), px, depends on the pose and on the readout: derivatives by the pose, by a
-/// readout (1/s) at the camera's rates of rotation, and at slow rates. The last one is the instrument.
+/// How a feature's position (u_left, v_left), px, depends on pose and readout.
 struct Shift {
+  /// By the pose (six rows, m and rad), by the readout (s) at the camera's rates of rotation, and by it at slow rates:
+  /// the instrument.
   Eigen::Matrix<double, 8, 2> derivative;
-  Eigen::Vector2d residual;
+  Eigen::Vector2d residual;  ///< measured - projected, px
 };
 
-/// Ratio to a variance that so many pairs imply, by which RowDelay::kSquare is exceeded as rarely as with a known one:
-/// Student's distribution (Wallace 1959).
+/// Factor on a variance that is estimated from `pairs`. With it, RowDelay::kSquare is exceeded as rarely as with a
+/// known variance: Student's distribution (Wallace 1959).
 double studentRatio(double pairs) {
   const double freedom = pairs - 1.0, correction = (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
   return pairs * std::expm1(RowDelay::kSquare / freedom * correction * correction) / RowDelay::kSquare;
@@ -30,32 +31,32 @@ double studentRatio(double pairs) {
 
 }  // namespace
 
-/// Matched features, with the same points' positions in the previous pair. More of them would not show the readout
-/// better: the rates err more than positions.
-std::vector<RowReadout::Seen> RowReadout::seenBefore(const StereoFeatures& features,
-                                                     const MotionHypothesis& found) const {
+/// Matched features, with the same points' positions in the previous pair. More than kMost would not make the readout
+/// more precise, because the rates err more than the positions.
+std::vector<RowReadout::Track> RowReadout::tracksOf(const StereoFeatures& features,
+                                                    const MotionHypothesis& found) const {
   constexpr std::size_t kMost = 256;  // (chosen)
-  std::vector<Seen> seen;
-  if (last_.empty()) return seen;
+  std::vector<Track> tracks;
+  if (last_positions_.empty()) return tracks;
   const std::size_t step = 1 + found.matches.size() / kMost;
   for (std::size_t i = 0; i < found.matches.size(); i += step) {
     const FeatureMatch& match = found.matches[i];
     const int before = found.view->newest[match.reference];
     if (before < 0) continue;
-    const cv::Point2f& last = last_[before];
-    seen.push_back({{last.x, last.y, found.view->pixels[match.reference].z},
-                    {features.u[match.current], features.v[match.current]}});
+    const cv::Point2f& last = last_positions_[before];
+    tracks.push_back({{last.x, last.y, found.view->pixels[match.reference].z},
+                      {features.u[match.current], features.v[match.current]}});
   }
-  return seen;
+  return tracks;
 }
 
 void RowReadout::add(const StereoFeatures& features, const MotionHypothesis& found, double dt) {
   constexpr double kSteady = 0.3;  // ratio (chosen) by which intervals may differ
   if (!pairs_.empty() && !(std::abs(dt - pairs_.back().dt) < kSteady * pairs_.back().dt)) pairs_.clear();
   const Eigen::Isometry3d& T = found.motion.T_current_reference;
-  pairs_.push_back({features.camera, seenBefore(features, found), T, dt, logSO3(T.linear().transpose()) / dt});
-  last_.clear();
-  for (int i = 0; i < features.count(); ++i) last_.emplace_back(features.u[i], features.v[i]);
+  pairs_.push_back({features.camera, tracksOf(features, found), T, dt, logSO3(T.linear().transpose()) / dt});
+  last_positions_.clear();
+  for (int i = 0; i < features.count(); ++i) last_positions_.emplace_back(features.u[i], features.v[i]);
   if (pairs_.size() <= 2 * kAround) return;
   measure();
   pairs_.pop_front();
@@ -63,7 +64,8 @@ void RowReadout::add(const StereoFeatures& features, const MotionHypothesis& fou
 
 /// Adds the middle one of the pairs to the sums.
 void RowReadout::measure() {
-  // The rate at a pair from the means before and after it (Colella and Woodward 1984), and its binomial mean over five.
+  // Rate at the stamp of pair `k`, from the means over the intervals around it (Colella and Woodward 1984), and its
+  // binomial mean over five pairs.
   const auto rateAt = [&](std::size_t k) -> Eigen::Vector3d {
     return (7.0 * (pairs_[k].rate + pairs_[k + 1].rate) - pairs_[k - 1].rate - pairs_[k + 2].rate) / 12.0;
   };
@@ -73,29 +75,32 @@ void RowReadout::measure() {
   const Pair& pair = pairs_[kAround];
   const StereoCamera& camera = pair.camera;
   const Eigen::Isometry3d& T = pair.T_current_previous;
+  // At the stamps of the previous pair and of this one.
   const std::array<Eigen::Vector3d, 2> rates = {rateAt(kAround - 1), rateAt(kAround)};
   const std::array<Eigen::Vector3d, 2> slow_rates = {slowRateAt(kAround - 1), slowRateAt(kAround)};
   std::vector<Shift> shifts;
-  for (const Seen& seen : pair.seen) {
-    const Eigen::Vector3d before = camera.backProject(seen.before.x(), seen.before.y(), seen.before.z());
+  for (const Track& track : pair.tracks) {
+    const Eigen::Vector3d before = camera.backProject(track.before.x(), track.before.y(), track.before.z());
     const Eigen::Vector3d now = T * before;
     if (!(now.z() > camera.nearestDepth())) continue;
     const Eigen::Matrix<double, 2, 6> by_pose = motionJacobian(camera, T, before).topRows<2>();
+    // px for a readout of 1 s: the previous row's rotation moves the point, this row's rotation moves the camera.
     const auto shiftBy = [&](const std::array<Eigen::Vector3d, 2>& rate) -> Eigen::Vector2d {
       const Eigen::Vector3d moved = T.linear() * rate[0].cross(before);
-      return rowTime(camera, seen.before.y()) * by_pose.leftCols<3>() * moved -
-             rowTime(camera, seen.now.y()) * by_pose.rightCols<3>() * rate[1];
+      return rowTime(camera, track.before.y()) * by_pose.leftCols<3>() * moved -
+             rowTime(camera, track.now.y()) * by_pose.rightCols<3>() * rate[1];
     };
     Shift& shift = shifts.emplace_back();
     shift.derivative.topRows<6>() = by_pose.transpose();
     shift.derivative.row(6) = shiftBy(rates).transpose(), shift.derivative.row(7) = shiftBy(slow_rates).transpose();
-    shift.residual = seen.now - camera.project(now).head<2>();
+    shift.residual = track.now - camera.project(now).head<2>();
   }
   if (static_cast<int>(shifts.size()) < kFewestMeasured) return;
 
-  // Cauchy's kernel around the pair's own fit, which has the readout: else the largest shifts would weigh least.
+  // Cauchy's kernel around the pair's own fit of pose and readout. Around a fit of the pose alone, the largest shifts
+  // would have the least weight. The instrument has no part in the fit.
   constexpr int kPasses = 2;  // (chosen)
-  const double corner = NoiseOptions().corner, bend = noiseGate(2) * corner * corner;
+  const double corner = NoiseOptions().corner, kernel_square = noiseGate(2) * corner * corner;
   using Vector = Eigen::Matrix<double, 8, 1>;
   Vector fit = Vector::Zero(), by_residual;
   if (information_ > 0.0) fit[6] = product_ / information_;
@@ -103,13 +108,13 @@ void RowReadout::measure() {
   for (int pass = 0; pass < kPasses; ++pass) {
     square.setZero(), by_residual.setZero();
     for (const Shift& shift : shifts) {
-      const double weight = 1.0 / (bend + (shift.residual - shift.derivative.transpose() * fit).squaredNorm());
+      const double weight = 1.0 / (kernel_square + (shift.residual - shift.derivative.transpose() * fit).squaredNorm());
       square += weight * shift.derivative * shift.derivative.transpose();
       by_residual += weight * shift.derivative * shift.residual;
     }
     fit.head<7>() = square.topLeftCorner<7, 7>().ldlt().solve(by_residual.head<7>());
   }
-  // Product of instrument and shift, and of instrument and residual, without what the pose explains of them.
+  // Instrument * shift and instrument * residual, for the instrument less its regression on the pose.
   const Vector6d explained = square.topLeftCorner<6, 6>().ldlt().solve(square.topRightCorner<6, 1>());
   const double information = square(6, 7) - explained.dot(square.block<6, 1>(0, 6));
   const double product = by_residual[7] - explained.dot(by_residual.head<6>());
@@ -123,7 +128,8 @@ void RowReadout::measure() {
 }
 
 std::optional<RowReadout::Estimate> RowReadout::estimate() const {
-  // Rates that the readout itself biases: drives that follow hand_held 921 and 922 err by 0 to 6 % at 10 and 25 ms.
+  // The readout itself biases the measured rates: drives that follow hand_held 921 and 922 err by 0 to 6 % at 10 and
+  // 25 ms.
   constexpr double kModel = 0.05;  // ratio of the value
   if (!(information_ > 0.0)) return std::nullopt;
   const double value = product_ / information_;
@@ -135,7 +141,7 @@ std::optional<RowReadout::Estimate> RowReadout::estimate() const {
   return estimate;
 }
 
-double RowReadout::proved() const {
+double RowReadout::usableValue() const {
   const auto known = estimate();
   return known && known->sigma < kWarn && known->isRolling() ? known->value : 0.0;
 }

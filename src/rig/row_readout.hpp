@@ -14,13 +14,14 @@
 namespace sdvo {
 
 /// Readout time of a rolling shutter, from the first row to the last. While the camera turns, each row has another
-/// pose: a point is shifted by its image velocity * readout * its row's part of the height. Each pair's pose is fitted
-/// and eliminated, so only changes of the rate and of rows show it. Rates at the stamps follow from the mean rates of
-/// the motions around them. A tremor that is faster than pairs makes them err: slow rates are the instrument (Wright
-/// 1928).
+/// pose: a point is shifted by its image velocity * readout * rowTime(). Under a constant rate, a point that keeps its
+/// row has the same shift in both pairs of a motion. So only changes of the rate and of rows constrain the readout.
+/// Each pair's pose is estimated with it and eliminated. Rates at the stamps follow from the mean rates of the motions
+/// around them. A tremor faster than pairs makes them err, and errors of a regressor bias the readout, so slow rates
+/// are the instrument (Wright 1928).
 class RowReadout {
  public:
-  /// s; a readout of 3 ms causes position errors of 5 sigma.
+  /// s; a readout of 3 ms causes position errors of 5 standard deviations of the published covariance.
   static constexpr double kWarn = 0.003;
 
   struct Estimate {
@@ -29,35 +30,38 @@ class RowReadout {
     bool isRolling() const { return std::abs(value) > kWarn && value * value > RowDelay::kSquare * sigma * sigma; }
   };
 
-  /// Adds a pair with rows as they were taken, and its motion of `dt` s since the pair before, the map's newest one.
+  /// Adds a pair before its rows are moved to the stamp. `found`: its motion since the previous pair, `dt` s before,
+  /// which is the map's newest one.
   void add(const StereoFeatures& features, const MotionHypothesis& found, double dt);
   /// The next pair does not continue the last one.
-  void interrupt() { pairs_.clear(), last_.clear(); }
+  void interrupt() { pairs_.clear(), last_positions_.clear(); }
 
   std::optional<Estimate> estimate() const;
-  /// The estimate, s, of a shutter that is certainly rolling, once it is precise enough to be of use; else 0.
-  double proved() const;
+  /// The estimate, s, once the shutter is certainly rolling and its standard deviation is below kWarn; else 0.
+  double usableValue() const;
 
  private:
-  /// A feature and what it was in the pair before.
-  struct Seen {
+  /// A point in two successive pairs.
+  struct Track {
     Eigen::Vector3d before;  ///< u_left, v_left, disparity, px
     Eigen::Vector2d now;     ///< u_left, v_left, px
   };
   struct Pair {
     StereoCamera camera;
-    std::vector<Seen> seen;
+    std::vector<Track> tracks;
     Eigen::Isometry3d T_current_previous;
     double dt;             ///< since the pair before, s
-    Eigen::Vector3d rate;  ///< mean over that time, rad/s about the camera's axes
+    Eigen::Vector3d rate;  ///< mean since the pair before, rad/s about the camera's axes
   };
-  std::vector<Seen> seenBefore(const StereoFeatures& features, const MotionHypothesis& found) const;
+  std::vector<Track> tracksOf(const StereoFeatures& features, const MotionHypothesis& found) const;
   void measure();
 
-  std::deque<Pair> pairs_;                    ///< the last ones; each continues the one before
-  std::vector<cv::Point2f> last_;             ///< features of the last pair, px
-  double information_ = 0.0, product_ = 0.0;  ///< of instrument and shift for 1 s, of instrument and residual
-  /// Sums over pairs of squares and products of information and product, for the empirical deviation.
+  std::deque<Pair> pairs_;                   ///< the last ones; each continues the one before
+  std::vector<cv::Point2f> last_positions_;  ///< of all features of the last pair, px
+  /// Sums over pairs of instrument * shift for a readout of 1 s, and of instrument * residual. Their ratio is the
+  /// readout, s.
+  double information_ = 0.0, product_ = 0.0;
+  /// Sums of a pair's information^2, information * product, and product^2, for the standard deviation.
   double information_square_ = 0.0, mixed_ = 0.0, product_square_ = 0.0;
 };
 

@@ -57,14 +57,14 @@ TEST(MotionPrior, IsAsWideAsWhiteAccelerationMakesIt) {
   }
   const MotionPrior prior = moving(options);
   EXPECT_NEAR(prior.predicted(kInterval).covariance(2, 2) / square, 1.0, 0.1);
-  EXPECT_NEAR(prior.confirmed(kSecond, kInterval)->covariance(2, 2) / square, 1.0, 0.1);
-  EXPECT_NEAR(prior.confirmed(2 * kSecond, kInterval)->covariance(2, 2) / square_after_a_second, 1.0, 0.1);
+  EXPECT_NEAR(prior.priorByConfirmed(kSecond, kInterval)->covariance(2, 2) / square, 1.0, 0.1);
+  EXPECT_NEAR(prior.priorByConfirmed(2 * kSecond, kInterval)->covariance(2, 2) / square_after_a_second, 1.0, 0.1);
 }
 
 TEST(MotionPrior, StampsMakeTheWayUncertainNotTheSides) {
   MotionPriorOptions options;
   options.stamp_sigma = 0.02;
-  const Matrix6d with = moving(options).confirmed(kSecond, 0.1)->covariance;
+  const Matrix6d with = moving(options).priorByConfirmed(kSecond, 0.1)->covariance;
   EXPECT_GT(std::sqrt(with(2, 2)), 3.0 * 0.02 * std::sqrt(2.0)) << "the ends of an interval err apart";
   EXPECT_LT(with(0, 0), 0.5 * with(2, 2));
 }
@@ -100,7 +100,7 @@ TEST(MotionPrior, AMeanOverALongIntervalIsNoVelocityOfNow) {
   // Of a random walk: its value at the end differs from the mean by a third of the variance over the 3 s.
   const double least = std::pow(options.acceleration, 2) * 3.0 / 3.0 * 0.1 * 0.1;
   for (const double variance :
-       {prior.confirmed(kSecond, 0.1)->covariance(2, 2), prior.predicted(0.1).covariance(2, 2)}) {
+       {prior.priorByConfirmed(kSecond, 0.1)->covariance(2, 2), prior.predicted(0.1).covariance(2, 2)}) {
     EXPECT_GT(variance, least);
     EXPECT_LT(variance, 2.1 * least);
   }
@@ -111,10 +111,10 @@ TEST(MotionPrior, ADoubtfulMotionPredictsAndConfirmsNothing) {
   prior.takeVelocity(2 * kSecond, ahead(0.9), 0.1, Matrix6d::Zero(), false, Matrix6d::Identity());
   EXPECT_NEAR((*prior.velocity())[2], 9.0, 1e-12);
   EXPECT_GT(prior.predicted(0.1).covariance(2, 2), 1.0);
-  EXPECT_NEAR(prior.confirmed(2 * kSecond, 0.1)->motion.translation().z(), 0.3, 1e-12);
+  EXPECT_NEAR(prior.priorByConfirmed(2 * kSecond, 0.1)->motion.translation().z(), 0.3, 1e-12);
   prior.interrupt();
   EXPECT_FALSE(prior.velocity());
-  EXPECT_TRUE(prior.confirmed(2 * kSecond, 0.1));
+  EXPECT_TRUE(prior.priorByConfirmed(2 * kSecond, 0.1));
 }
 
 TEST(MotionPrior, APairThatGoesBackAfterOneThatWentTwiceAsFarChangedPlacesWithIt) {

@@ -76,7 +76,7 @@ class MotionSearchTest : public ::testing::Test {
   MotionScene sceneOf(const StereoFeatures& features, std::optional<double> expected, std::optional<double> prior,
                       bool is_doubted) const {
     MotionScene scene{map_, calibration_, features, {}, {}, {}};
-    scene.is_suspected = scene.is_doubted = is_doubted;
+    scene.all_compete = scene.searches_wide = is_doubted;
     scene.noise = noise_of_rig_;
     if (expected) scene.T_current_reference = Eigen::Isometry3d(Eigen::Translation3d(-*expected, 0.0, 0.0));
     if (prior)

@@ -205,7 +205,7 @@ TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
   expectCorner(off, features, 0.7);
   StereoFeatures unlike = features;
   cv::RNG(1).fill(unlike.patches, cv::RNG::UNIFORM, 0, 256);
-  expectCorner(PatchAlignmentOptions(), unlike, map_options.noise.unconfirmed());
+  expectCorner(PatchAlignmentOptions(), unlike, map_options.noise.unconfirmedCorner());
   features.patch_layout.side = 0;
   features.patches.release();
   expectCorner(PatchAlignmentOptions(), features, 0.7);

@@ -60,7 +60,7 @@ TEST(Noise, WhatItsPatchDoesNotConfirmIsAnywhereWithinTheGate) {
     if (std::sqrt(2.0 * (u * u + v * v)) > gate) continue;
     square += 0.5 * (u * u + v * v), ++within;
   }
-  EXPECT_NEAR(NoiseOptions().unconfirmed(), std::sqrt(square / within), 0.01);
+  EXPECT_NEAR(NoiseOptions().unconfirmedCorner(), std::sqrt(square / within), 0.01);
 }
 
 TEST(Noise, WhatPointsErrAlikeIsLearntAndAtLeastWhatTheyErrByThemselves) {

@@ -16,7 +16,7 @@ using Vector = RigCalibration::Vector;
 constexpr int kRoll = RigEstimate::kRoll, kDelay = RigEstimate::kDelay;
 
 const double kSigma =
-    std::sqrt(1.0 / (4.0 * CalibrationFilter::kHonest));  // px: an information of 4 in a window's units
+    std::sqrt(1.0 / (4.0 * CalibrationFilter::kRealInformation));  // px: an information of 4 in a window's units
 
 CalibrationOptions someOptions() {
   CalibrationOptions options;
@@ -49,7 +49,7 @@ void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& 
   const CalibrationBelief prior = filter.prior(shape);
   RigCalibration result;
   result.value = (prior.information + information).inverse() * (prior.information * prior.mean + information * own);
-  filter.note(oldest, newest, shape, result, information);
+  filter.update(oldest, newest, shape, result, information);
 }
 
 double normal(double distance, double variance) {
@@ -62,7 +62,8 @@ struct Moments {
   Vector mean, variance;
 };
 Moments mixed(const Vector& own, const Matrix& information) {
-  const Eigen::Vector2d variance = (CalibrationFilter::kHonest * information.diagonal().head<2>()).cwiseInverse();
+  const Eigen::Vector2d variance =
+      (CalibrationFilter::kRealInformation * information.diagonal().head<2>()).cwiseInverse();
   const Eigen::Vector2d distance = (own - kPrior).head<2>();
   double as_options = 1.0, other = 1.0;
   for (int i = 0; i < 2; ++i) {
@@ -88,7 +89,7 @@ TEST(CalibrationFilter, BeginsAsTheOptionsSayOrAroundThat) {
 }
 
 TEST(CalibrationFilter, GoesOverFromTheOptionsToWhatWindowsMeasure) {
-  const double sigma = 1.0 / std::sqrt(12.0 * CalibrationFilter::kHonest);
+  const double sigma = 1.0 / std::sqrt(12.0 * CalibrationFilter::kRealInformation);
   for (const double sigmas : {0.0, 1.0, 2.0, 3.0, 5.0, 20.0}) {
     CalibrationFilter filter(someOptions());
     const Vector own = kPrior + sigmas * Vector(sigma, -0.5 * sigma, 0.0);
@@ -118,12 +119,12 @@ TEST(CalibrationFilter, AWindowUsesWhatTheFilterKnowsWhileOneKeyFrameStays) {
   const Vector noise(0.05, 0.02, 0.0);  // px: two standard deviations of a window
   for (int newest = 2; newest < 60; ++newest) {
     addWindow(filter, 1, newest, noise, 1600.0 * Matrix::Identity());
-    const RigEstimate used = filter.used();
+    const RigEstimate used = filter.compensated();
     EXPECT_NEAR(used.mean[0], filter.calibration().value[0], 1e-12) << "what is reported is what the window used";
     EXPECT_GE(used.covariance(0, 0), std::pow(used.mean[0] - meanOf(filter)[0], 2));
   }
   EXPECT_LT(meanOf(filter)[0], 0.3 * noise[0]);
-  EXPECT_LT(filter.used().mean[0], 0.6 * noise[0]);
+  EXPECT_LT(filter.compensated().mean[0], 0.6 * noise[0]);
 }
 
 TEST(CalibrationFilter, ManyWindowsKnowMoreAndPoorOnesTakeNothingAway) {
@@ -222,7 +223,7 @@ TEST(CalibrationFilter, RowsShowRollAndDelayToo) {
     EXPECT_NEAR(std::sqrt(filter.estimate().covariance(parameter, parameter)), std::sqrt(0.5) * prior, 1e-9)
         << "half of the rigs have none";
     for (const double shown : {measured, prior}) {
-      filter.noteRows(parameter, shown, measured);
+      filter.updateByRows(parameter, shown, measured);
       const double mean = filter.estimate().mean[parameter];
       EXPECT_LE(mean, shown);
       EXPECT_NEAR(mean, shown > measured ? shown : 0.0, 0.25 * measured) << "as far as chance does not explain it";
@@ -263,9 +264,9 @@ TEST(CalibrationFilter, HalvesThatDifferDoNotGrow) {
 
 TEST(CalibrationFilter, WhatIsLeftAtAPointIsKnownOnceTwentyWindowsToldOfIt) {
   CalibrationFilter filter(someOptions());
-  for (int window = 1; window < 20; ++window) filter.noteCommon(0.02 + (window % 2) * 0.04);
+  for (int window = 1; window < 20; ++window) filter.updateCommon(0.02 + (window % 2) * 0.04);
   EXPECT_FALSE(priorOf(filter).common_sigma);
-  filter.noteCommon(0.02);
+  filter.updateCommon(0.02);
   ASSERT_TRUE(priorOf(filter).common_sigma);
   // Their mean is 0.04 px^2.
   EXPECT_NEAR(*priorOf(filter).common_sigma, 0.2, 1e-9);
@@ -273,10 +274,10 @@ TEST(CalibrationFilter, WhatIsLeftAtAPointIsKnownOnceTwentyWindowsToldOfIt) {
 
 TEST(CalibrationFilter, WhatIsLeftAtAPointMayChange) {
   CalibrationFilter filter(someOptions());
-  for (int window = 0; window < 1000; ++window) filter.noteCommon(0.01);
-  for (int window = 0; window < 200; ++window) filter.noteCommon(0.09);
+  for (int window = 0; window < 1000; ++window) filter.updateCommon(0.01);
+  for (int window = 0; window < 200; ++window) filter.updateCommon(0.09);
   EXPECT_GT(*priorOf(filter).common_sigma, std::sqrt(0.05));
-  for (int window = 0; window < 2000; ++window) filter.noteCommon(0.09);
+  for (int window = 0; window < 2000; ++window) filter.updateCommon(0.09);
   EXPECT_NEAR(*priorOf(filter).common_sigma, 0.3, 1e-3);
 }
 

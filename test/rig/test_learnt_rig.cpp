@@ -6,9 +6,9 @@
 
 namespace sdvo::test_learnt_rig {
 
-ShownRotation shown(const LearntRig& rig, const StereoFeatures& features,
-                    const Eigen::Vector3d& turn = Eigen::Vector3d::Zero()) {
-  return rig.shownRotation(features, MotionHypothesis(), Eigen::Vector3d::Zero(), turn * turn.transpose(), 0.1);
+RotationHypothesis shown(const LearntRig& rig, const StereoFeatures& features,
+                         const Eigen::Vector3d& turn = Eigen::Vector3d::Zero()) {
+  return rig.rotationHypothesis(features, MotionHypothesis(), Eigen::Vector3d::Zero(), turn * turn.transpose(), 0.1);
 }
 
 void learn(LearntRig& rig, const StereoFeatures& features, int pairs = 1) {
@@ -26,7 +26,7 @@ TEST(LearntRig, AKnockOfTheRightCameraIsOneRotation) {
   const StereoFeatures before = gridSeenWith({0.3e-3, 0.0, -0.5e-3}), turned = gridSeenWith({0.3e-3, 0.0, 5.5e-3});
   LearntRig rig = steady(before);
   EXPECT_LT(shown(rig, before).log_odds, logOdds(0.05));
-  const ShownRotation rotation = shown(rig, turned);
+  const RotationHypothesis rotation = shown(rig, turned);
   EXPECT_GT(rotation.log_odds, 0.0);
   EXPECT_LT((rotation.value - knock).norm(), 0.2e-3);
   EXPECT_TRUE(contains(rotation.words(), "0.34 degrees")) << rotation.words();
@@ -38,7 +38,7 @@ TEST(LearntRig, ARotationOfOnePairIsTakenBack) {
   const StereoFeatures before = gridSeenWith(Eigen::Vector3d::Zero()), turned = gridSeenWith({0.0, 0.0, 6e-3});
   LearntRig rig = steady(before);
   rig.rotate(shown(rig, turned), before.camera);
-  const ShownRotation back = shown(rig, rotatedBack(before, rig.rotation));
+  const RotationHypothesis back = shown(rig, rotatedBack(before, rig.rotation));
   ASSERT_GT(back.log_odds, 0.0) << "a return is a rotation";
   rig.rotate(back, before.camera);
   EXPECT_TRUE(rig.rotation.isZero() && rig.rotation_covariance.isZero());
@@ -80,7 +80,7 @@ TEST(LearntRig, WhereImagesWereRefusedARotationByTheCamerasTurnIsAnotherMoment) 
   refused.report.refused = true;
   rig.learn(refused, nullptr, {}, {}, false);
   EXPECT_LT(shown(rig, turned, turn).log_odds, 0.0);
-  EXPECT_GT(shown(rig, turned, turn).other_moment, 0.0);
+  EXPECT_GT(shown(rig, turned, turn).log_odds_of_other_moment, 0.0);
   EXPECT_GT(shown(rig, turned, another).log_odds, 0.0);
   learn(rig, before, 20);
   EXPECT_GT(shown(rig, turned, turn).log_odds, 0.0) << "long ago";

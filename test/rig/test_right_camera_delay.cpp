@@ -120,7 +120,7 @@ TEST(RightCameraDelay, KnowsThePartnerOfAnotherPair) {
     RightCameraDelay right_delay;
     const Vector6d velocity = velocityAt(1.0);
     const StereoFeatures features = seen(velocity, delay, 0.15);
-    right_delay.watch(rowsOf(features, velocity), kPeriod, kRowError);
+    right_delay.updateOtherPair(rowsOf(features, velocity), kPeriod, kRowError);
     const bool is_another = std::abs(delay) == kPeriod;
     EXPECT_EQ(right_delay.otherPair(kPeriod).log_odds > 0.0, is_another) << delay;
     if (is_another) {
@@ -133,7 +133,7 @@ TEST(RightCameraDelay, KnowsThePartnerUntilRowsInStepSayOtherwise) {
   RightCameraDelay right_delay;
   const Vector6d velocity = velocityAt(1.0);
   const auto measure = [&](const StereoFeatures& features, const Vector6d& moved) {
-    right_delay.watch(rowsOf(features, moved), kPeriod, kRowError);
+    right_delay.updateOtherPair(rowsOf(features, moved), kPeriod, kRowError);
     return right_delay.otherPair(kPeriod).log_odds;
   };
   const StereoFeatures late = seen(velocity, kPeriod, 0.15);
@@ -159,7 +159,7 @@ TEST(RightCameraDelay, LeftImagesThatShiftWhileTheCameraStandsAreNoPartnerOfAnot
       const double moved = turn * place(random);
       rows.push_back({moved / kPeriod, noise(random) - moved, i % RowDelay::kParts});
     }
-    right_delay.watch(rows, kPeriod, kRowError);
+    right_delay.updateOtherPair(rows, kPeriod, kRowError);
     EXPECT_LT(right_delay.otherPair(kPeriod).log_odds, logOdds(0.05)) << pair;
   }
 }
@@ -175,7 +175,7 @@ TEST(RightCameraDelay, PartsOfTheImageAreTheWitnessesHoweverManyCornersTheyHave)
       const double velocity = 3.0 * (i % parts % 2);  // px/s
       rows.push_back({velocity, kPeriod * velocity + 0.1 * normal(random), i % parts});
     }
-    right_delay.watch(rows, kPeriod, kRowError);
+    right_delay.updateOtherPair(rows, kPeriod, kRowError);
     return right_delay.otherPair(kPeriod).log_odds - kUnsuspected;
   };
   EXPECT_NEAR(evidence(2, 2000) / evidence(2, 200), 1.0, 0.2);

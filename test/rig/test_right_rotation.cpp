@@ -73,7 +73,7 @@ RightRotation plainRotation(const StereoCamera& camera, const NoiseOptions& nois
       *residual = scale.cwiseProduct(*residual);
       const double weight = noiseGate(3) / (noiseGate(3) + residual->squaredNorm());
       hessian += weight * jacobian.transpose() * jacobian;
-      const int part = RowDelay::cellOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height);
+      const int part = RowDelay::partOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height);
       gradients.try_emplace(part, Vector::Zero()).first->second += weight * jacobian.transpose() * *residual;
     }
     if (step == steps) {

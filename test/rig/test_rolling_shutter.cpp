@@ -97,10 +97,10 @@ TEST(RollingShutter, TheVelocityIsBetweenTheMotionsAroundIt) {
   RolledPair pair;
   EXPECT_EQ(shutter.velocityAt(pair), Vector6d::Zero());
   EXPECT_EQ(shutter.velocityBetween(pair, turning()), turning());
-  pair.mean = turning(), pair.dt = kPeriod;
+  pair.mean_velocity = turning(), pair.dt = kPeriod;
   EXPECT_EQ(shutter.velocityAt(pair), turning());
   EXPECT_TRUE(shutter.velocityBetween(pair, 2.0 * turning()).isApprox(1.5 * turning()));
-  pair.mean_before = 0.6 * turning();
+  pair.mean_velocity_before = 0.6 * turning();
   EXPECT_TRUE(shutter.velocityAt(pair).isApprox(1.1 * turning()));
 }
 
@@ -109,11 +109,11 @@ TEST(RollingShutter, WeighsRowsByHowUnevenMotionsAre) {
   const auto expected_and_rows = [&](const Vector6d& unevenness) {
     RollingShutter shutter(kReadout, kAcceleration);
     RolledPair pair;
-    pair.mean = turning(), pair.mean_before = turning(), pair.dt = kPeriod;
+    pair.mean_velocity = turning(), pair.mean_velocity_before = turning(), pair.dt = kPeriod;
     for (int k = 0; k < 100; ++k) shutter.learn(pair, turning() + (k % 2 == 0 ? 1.0 : -1.0) * unevenness);
     pair.rate_by_rows = RateByRows{turning().tail<3>() + more, 1e-4 * Eigen::Matrix3d::Identity(),
                                    Eigen::Matrix<double, 6, 3>::Constant(0.01)};
-    EXPECT_GE(shutter.momentOf(pair).trace(), 0.0);
+    EXPECT_GE(shutter.covarianceByVelocity(pair).trace(), 0.0);
     return (shutter.velocityAt(pair) - turning()).tail<3>().norm() / more.norm();
   };
   EXPECT_LT(expected_and_rows(Vector6d::Constant(1e-4)), 0.05);

@@ -21,7 +21,7 @@ class Rig {
       const double u = 640.0 * uniform(), v = 480.0 * uniform(), disparity = 5.0 + 20.0 * uniform() * v / 480.0;
       const double velocity = turning + along * disparity * (v - 240.0) / 240.0;
       const double rectification = 0.4 * (u - 320.0) / 320.0 - 0.3 * (v - 240.0) / 240.0 + 0.01 * disparity;
-      rows.push_back({RowDelay::cellOf(u, v, 640, 480), rectification + delay_ * velocity + 0.15 * normal_(random_),
+      rows.push_back({RowDelay::partOf(u, v, 640, 480), rectification + delay_ * velocity + 0.15 * normal_(random_),
                       velocity, turning, disparity});
     }
     rows[7].dv = 30.0;  // a wrong match
@@ -48,7 +48,7 @@ TEST(RowDelay, FindsItAmongErrorsOfTheRectification) {
     const auto found = ofNods(delay, 40.0, 5.0).estimate();
     ASSERT_TRUE(found);
     EXPECT_NEAR(found->value, delay, 2e-4);
-    EXPECT_GT(std::abs(found->proved()), 0.9 * kDelay);
+    EXPECT_GT(std::abs(found->significantValue()), 0.9 * kDelay);
   }
 }
 
@@ -56,7 +56,8 @@ TEST(RowDelay, ProvesNoneOnARigInStep) {
   for (unsigned seed = 1; seed <= 30; ++seed) {
     const auto found = ofNods(0.0, 40.0, 5.0, seed).estimate();
     ASSERT_TRUE(found);
-    EXPECT_EQ(found->proved(), 0.0) << 1e3 * found->value << " +- " << 1e3 * found->sigma << " ms, seed " << seed;
+    EXPECT_EQ(found->significantValue(), 0.0)
+        << 1e3 * found->value << " +- " << 1e3 * found->sigma << " ms, seed " << seed;
   }
 }
 
@@ -66,18 +67,19 @@ TEST(RowDelay, IsUnknownWhereTheViewHardlyTurns) {
   EXPECT_FALSE(RowDelay(0.995, 2.0).estimate());
 }
 
-TEST(RowDelay, ProvedIsWhatChanceDoesNotExplain) {
+TEST(RowDelay, SignificantIsWhatChanceDoesNotExplain) {
   // A normal distribution exceeds 3.89 standard deviations once in 10,000 times.
   for (const double sign : {-1.0, 1.0}) {
-    EXPECT_NEAR((RowDelay::Estimate{5.0 * sign, 1.0}.proved()), sign * std::sqrt(5.0 * 5.0 - 3.89 * 3.89), 0.01);
-    EXPECT_EQ((RowDelay::Estimate{3.0 * sign, 1.0}.proved()), 0.0);
+    EXPECT_NEAR((RowDelay::Estimate{5.0 * sign, 1.0}.significantValue()), sign * std::sqrt(5.0 * 5.0 - 3.89 * 3.89),
+                0.01);
+    EXPECT_EQ((RowDelay::Estimate{3.0 * sign, 1.0}.significantValue()), 0.0);
   }
 }
 
 TEST(RowDelay, PartsOfTheImageAreRowByRow) {
-  EXPECT_EQ(RowDelay::cellOf(-1.0, -1.0, 600, 400), 0);
-  EXPECT_EQ(RowDelay::cellOf(599.0, 99.0, 600, 400), RowDelay::kColumns - 1);
-  EXPECT_EQ(RowDelay::cellOf(700.0, 500.0, 600, 400), RowDelay::kColumns * RowDelay::kRows - 1);
+  EXPECT_EQ(RowDelay::partOf(-1.0, -1.0, 600, 400), 0);
+  EXPECT_EQ(RowDelay::partOf(599.0, 99.0, 600, 400), RowDelay::kColumns - 1);
+  EXPECT_EQ(RowDelay::partOf(700.0, 500.0, 600, 400), RowDelay::kColumns * RowDelay::kRows - 1);
 }
 
 }  // namespace sdvo::test_row_delay

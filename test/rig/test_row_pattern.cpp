@@ -74,7 +74,7 @@ Eigen::Vector3d squareByVariance(bool is_alike) {
     for (int i = 0; i < features.count(); ++i)
       features.dv[i] =
           is_alike
-              ? parts[RowDelay::cellOf(features.u[i], features.v[i], features.camera.width, features.camera.height)]
+              ? parts[RowDelay::partOf(features.u[i], features.v[i], features.camera.width, features.camera.height)]
               : normal(random);
     RowPattern pattern(0.9);
     pattern.learn(features);
@@ -100,7 +100,7 @@ TEST(RowPattern, MeanRowsThatFollowTheMeanFlowAreOfOtherPairs) {
       for (int i = 0; i < features.count(); ++i) {
         const double velocity = 0.1 * (features.v[i] - features.camera.cy) + 0.02 * features.disparity[i];
         rows.push_back({velocity, 0.0,
-                        RowDelay::cellOf(features.u[i], features.v[i], features.camera.width, features.camera.height)});
+                        RowDelay::partOf(features.u[i], features.v[i], features.camera.width, features.camera.height)});
         features.dv[i] += static_cast<float>(delay * velocity);
       }
       pattern.learn(features, rows);

@@ -40,8 +40,9 @@ struct NoiseOptions {
   /// The largest distance of a corner from its point, in each direction.
   double cornerGate() const { return corner * std::sqrt(noiseGate(1)); }
 
-  /// Of a corner whose patch is not the point's: it lies anywhere in a disc with u_left and u_right within the gate.
-  double unconfirmed() const { return inlierGate() / std::sqrt(8.0); }
+  /// Standard deviation of a corner that no patch confirms: it lies anywhere in a disc with u_left and u_right within
+  /// the gate.
+  double unconfirmedCorner() const { return inlierGate() / std::sqrt(8.0); }
 };
 
 enum class ConsensusMethod { kRansac, kMsac, kLoRansac, kGasac, kAdaptiveGasac };
