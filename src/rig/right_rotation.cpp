@@ -18,8 +18,8 @@ namespace sdvo {
 namespace {
 
 constexpr int kMotion = 6, kUnknowns = kMotion + 3;  // a left perturbation of the motion (m, rad), and the rotation
-using Vector = Eigen::Matrix<double, kUnknowns, 1>;
-using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+using UnknownsVector = Eigen::Matrix<double, kUnknowns, 1>;
+using UnknownsMatrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
 /// Noise of the equations, and where they are linearised.
 struct RotationEquations {
@@ -88,19 +88,19 @@ struct Inliers {
 
 /// Hessian, and gradients by part of the image.
 struct Linearisation {
-  Matrix hessian;
-  std::array<Vector, RowDelay::kParts> gradients;
+  UnknownsMatrix hessian;
+  std::array<UnknownsVector, RowDelay::kParts> gradients;
 
-  Vector gradient() const {
-    Vector sum = Vector::Zero();
-    for (const Vector& of_part : gradients) sum += of_part;
+  UnknownsVector gradient() const {
+    UnknownsVector sum = UnknownsVector::Zero();
+    for (const UnknownsVector& of_part : gradients) sum += of_part;
     return sum;
   }
 
   /// Covariance of the rotation: sandwich of the gradients between the Hessian's `inverse`.
-  Eigen::Matrix3d sandwich(const Matrix& inverse) const {
-    Matrix meat = hessian;  // lower bound: correlated errors of a part may cancel by chance
-    for (const Vector& of_part : gradients) meat += of_part * of_part.transpose();
+  Eigen::Matrix3d sandwich(const UnknownsMatrix& inverse) const {
+    UnknownsMatrix meat = hessian;  // lower bound: correlated errors of a part may cancel by chance
+    for (const UnknownsVector& of_part : gradients) meat += of_part * of_part.transpose();
     return (inverse * meat * inverse).bottomRightCorner<3, 3>();
   }
 };
@@ -122,7 +122,7 @@ Linearisation linearise(const Inliers& inliers, const Eigen::Isometry3d& T, cons
   for (int i = 0; i < kUnknowns; ++i)
     for (int j = i; j < kUnknowns; ++j)
       result.hessian(i, j) += total(sums[kUnknowns * i + j]), result.hessian(j, i) = result.hessian(i, j);
-  result.gradients.fill(Vector::Zero());
+  result.gradients.fill(UnknownsVector::Zero());
   for (std::size_t k = 0; k < inliers.parts.size(); ++k)
     for (int i = 0; i < kUnknowns; ++i)
       result.gradients[static_cast<std::size_t>(inliers.parts[k])][i] +=
@@ -186,15 +186,15 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
   RightRotation found;
   Linearisation equations = linearise(observed, T, found.value);
   for (int step = 0; step < kSteps; ++step) {
-    const Vector gradient = equations.gradient();
-    const Vector step_of_all = equations.hessian.ldlt().solve(gradient);
+    const UnknownsVector gradient = equations.gradient();
+    const UnknownsVector step_of_all = equations.hessian.ldlt().solve(gradient);
     if (!step_of_all.allFinite()) return std::nullopt;
     T = expSE3(Vector6d(step_of_all.head<kMotion>())) * T;
     found.value += step_of_all.tail<3>();
     if (gradient.dot(step_of_all) < kSmall) break;
     equations = linearise(observed, T, found.value);
   }
-  const Matrix inverse = equations.hessian.inverse();
+  const UnknownsMatrix inverse = equations.hessian.inverse();
   found.covariance = equations.sandwich(inverse);
   found.spread = static_cast<double>(inliers.size()) / (3.0 * disparity_sigma * disparity_sigma) *
                  inverse.bottomRightCorner<3, 3>();
