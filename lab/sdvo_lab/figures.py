@@ -29,7 +29,7 @@ def read():
 
 def write(entries):
     head = "".join(line for line in LIST.read_text().splitlines(True) if line.startswith("#"))
-    LIST.write_text(head + "\n" + yaml.safe_dump(entries, sort_keys=False, allow_unicode=True, width=150))
+    LIST.write_text(head + "\n" + yaml.safe_dump(entries, sort_keys=False, allow_unicode=True, width=1000, default_flow_style=None))
 
 
 def missing_data():
