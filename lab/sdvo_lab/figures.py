@@ -50,8 +50,8 @@ def page_errors(entries):
     for page, mark, entry in listed:
         if (page, mark) not in there:
             yield f"{page}: no marks for the table {mark} of lab/figures.yaml"
-        elif marks.commit(texts[page], mark) != entry["commit"]:
-            yield f"{page}: the table {mark} has not the commit of lab/figures.yaml, {entry['commit']}: lab/run figures --only NAME writes both"
+        elif marks.commit(texts[page], mark) != entry.get("commit"):
+            yield f"{page}: the table {mark} has not the commit of lab/figures.yaml: lab/run figures --only NAME writes both"
     for name, entry in entries.items():
         if "heading" in entry and not re.search(rf"^#+ {re.escape(entry['heading'])}$", texts[entry["page"]], re.MULTILINE):
             yield f"{entry['page']}: no heading {entry['heading']}, which {name} of lab/figures.yaml names"
@@ -59,7 +59,7 @@ def page_errors(entries):
 
 def old_errors(entries, digest):
     """Tables of another odometry, without a reason."""
-    return [f"{entry['page']}: {name} is of {entry['commit']}, and poses, states or covariances are others now: lab/run figures --only {name}, "
+    return [f"{entry['page']}: {name} is of {entry.get('commit')}, and poses, states or covariances are others now: lab/run figures --only {name}, "
             "or `exempt: REASON` in lab/figures.yaml" for name, entry in entries.items() if is_old(entry, digest) and not entry.get("exempt")]
 
 
@@ -93,7 +93,7 @@ def rows(entries, digest):
     yield ["table", "page", "commit", "state"]
     for name, entry in entries.items():
         state = "unknown" if digest is None else "old" if is_old(entry, digest) else "present"
-        yield [name, entry["page"], entry["commit"], state + (", exempt: " + entry["exempt"] if entry.get("exempt") else "")]
+        yield [name, entry["page"], entry.get("commit", "–"), state + (", exempt: " + entry["exempt"] if entry.get("exempt") else "")]
 
 
 def options(parser):
