@@ -15,6 +15,7 @@ COMMANDS = {
     "self-check": ("self_check", "the self-checks of run_sequence against the ground truth"),
     "experiments": ("experiments", "the paper's experiments"),
     "tables": ("tables", "tables of the paper's experiments from their CSV files"),
+    "figures": ("figures", "tables of the pages, made anew where the odometry is another one"),
     "golden": ("golden", "poses, states and covariances of two builds"),
     "shutters": ("shutters", "rolling shutters: ignored, estimated, known"),
     "two-cameras": ("two_cameras", "two cameras of one robot, fused by robot_localization"),

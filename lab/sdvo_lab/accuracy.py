@@ -2,7 +2,7 @@
 
     lab/run accuracy                                 # drives, guises and robots
     lab/run accuracy drives --record                 # recorded drives, and what changed since lab/docs/accuracy.csv, which is then written
-    lab/run accuracy guises robots --write           # puts these tables between the marks of lab/docs/faults.md and docs/precision.md
+    lab/run accuracy guises robots --write           # puts tables, all but `still`, between the marks of lab/docs/faults.md and docs/precision.md
 
 drives: every sequence of the data sets that has a ground truth. guises: some of them, and a rendered one, turned, cut, spoilt
 and in other orders (lab/run guises). robots: rendered drives of small rigs. long: rendered drives of 0.7 to 2.5 km along KITTI's ways,
@@ -57,13 +57,14 @@ def measure(drive, extra):
                   sum(row["features"] == "0" for row in run.timing))
 
 
-def recorded_table(work, extra, record):
+def recorded_table(work, extra, record, page):
     yield ["sequence", "t [%]", "r [deg/m]", "pair to pair [deg]", "change of these", "scale", "not tracked", "CPU ms per pair", "options"]
     before = {}
     if RECORD.exists():
         with open(RECORD) as file:
             before = {row["sequence"]: row for row in csv.DictReader(file)}
     rows = ["sequence,t_percent,r_deg_per_m,pair_to_pair_deg,not_tracked,options"]
+    of_page = [["sequence", "pairs", "translation [%]", "rotation [deg/m]", "rotation from pair to pair, rms [deg]", "not TRACKING"]]
     for kind in drives.DATA_SETS:
         for name in drives.recorded_names(kind):
             drive = drives.recorded(kind, name, work)
@@ -72,9 +73,13 @@ def recorded_table(work, extra, record):
                 change = (f"{e.t - float(last['t_percent']):+.3f}, {e.r - float(last['r_deg_per_m']):+.5f}, "
                           f"{e.pair - float(last['pair_to_pair_deg']):+.4f}")
             yield [drive.name, f"{e.t:.3f}", f"{e.r:.5f}", f"{e.pair:.4f}", change, f"{e.scale:.5f}", e.not_tracking, e.cpu, f"`{e.options}`"]
+            means = ["–", "–"] if kind == "karlsruhe" else [f"{e.t:.3f}", f"{e.r:.4f}"]  # lengths of its truth are wrong
+            of_page.append([drive.name, e.pairs, *means, f"{e.pair:.3f}", e.not_tracking])
             rows.append(f"{drive.name},{e.t:.4f},{e.r:.5f},{e.pair:.5f},{e.not_tracking},{e.options}")
     if record:
         RECORD.write_text("\n".join(rows) + "\n")
+    if page:
+        marks.put(page, "errors", marks.lines(of_page))
 
 
 def in_guise(drive, guise, work, extra):
@@ -146,10 +151,10 @@ def options(parser):
 def main(arguments):
     extra = programs.params(arguments) + (["--frames", str(arguments.frames)] if arguments.frames else [])
     with drives.folders(arguments) as (work, folder):
-        tables = {"drives": lambda: recorded_table(work, extra, arguments.record),
+        tables = {"drives": lambda: recorded_table(work, extra, arguments.record, arguments.write),
                   "guises": lambda: guise_table(work, folder, extra), "robots": lambda: robot_table(folder, extra),
                   "long": lambda: long_table(folder, extra, arguments.frames), "still": lambda: still_table(folder, extra, arguments.frames)}
         marks.check_names(arguments.tables, tables)
-        pages = {"guises": marks.FAULTS, "robots": marks.ACCURACY}
+        pages = {"guises": marks.FAULTS, "robots": marks.ACCURACY, "long": marks.ACCURACY}
         for name in arguments.tables or ("drives", "guises", "robots"):
             marks.show(tables[name](), pages.get(name) if arguments.write else None, name)

@@ -28,9 +28,8 @@ def machine():
         return subprocess.run(command, check=True, stdout=subprocess.PIPE, universal_newlines=True).stdout.splitlines()[0]
 
     model = re.search(r"^model name\s*: (.*)", pathlib.Path("/proc/cpuinfo").read_text(), re.MULTILINE)
-    commit = first("git", "-C", str(programs.ROOT), "rev-parse", "--short", "HEAD")
     return [f"{model.group(1) if model else os.uname().machine}, {os.cpu_count()} processors; {first('c++', '--version')}; "
-            f"commit {commit}; load {os.getloadavg()[0]:.1f} at the start."]
+            f"load {os.getloadavg()[0]:.1f} at the start."]
 
 
 def kernels():

@@ -95,7 +95,7 @@ def run(folder, experiment, arguments):
 
 
 def run_all(output, only):
-    from . import figures, tables
+    from . import diagrams, tables
     if drives.data_set("kitti") is None:
         sys.exit("error: set KITTI_DIR")
     with programs.pool() as pool:
@@ -105,8 +105,8 @@ def run_all(output, only):
         done = [pool.submit(run, output / folder, experiment, arguments) for folder, experiment, arguments in plan.runs]
         for (folder, experiment, _), rows in zip(plan.runs, done):
             print(f"{folder}: {experiment}, {len(rows.result())} rows", flush=True)
-            if experiment in figures.FIGURES and "ablation" not in folder:
-                figures.FIGURES[experiment](output / folder, rows.result())
+            if experiment in diagrams.FIGURES and "ablation" not in folder:
+                diagrams.FIGURES[experiment](output / folder, rows.result())
     lines = [f"{name}\n\n" + "\n".join(table) + "\n" for name, table in tables.tables_of(output).items()]
     (output / "tables.md").write_text("\n".join(lines))
     print("\n".join(lines))
@@ -123,12 +123,12 @@ def main(arguments):
     output.mkdir(parents=True, exist_ok=True)
     if arguments.experiment == "all":
         return run_all(output, arguments.only)
-    from . import figures
+    from . import diagrams
     if arguments.experiment == "size_curve":
         samples, curve = output / "size_curve.csv", output / "size_curve.yaml"
         print(programs.run("learn", "size-curve", "--output", curve, "--samples", samples, *arguments.rest))
-        return figures.draw_depth_scale(samples, curve, output / "size_curve.png")
+        return diagrams.draw_depth_scale(samples, curve, output / "size_curve.png")
     rows = run(output, arguments.experiment, arguments.rest)
     print(rows.to_string(index=False))
-    if arguments.experiment in figures.FIGURES:
-        figures.FIGURES[arguments.experiment](output, rows)
+    if arguments.experiment in diagrams.FIGURES:
+        diagrams.FIGURES[arguments.experiment](output, rows)

@@ -2,10 +2,13 @@
 
     lab/run golden record DIR DRIVE [DRIVE …]    # another build's: TOOLS=DIRECTORY, where its run_sequence is
     lab/run golden compare BEFORE AFTER          # exits 1 where anything differs
+    lab/run golden digest                        # one number of all that, for the first pairs of three recorded drives
     lab/run golden count                         # numbers of src/odometry"""
+import hashlib
 import pathlib
 import re
 import sys
+import tempfile
 
 import numpy
 
@@ -23,6 +26,30 @@ def record(directory, names):
 
     with programs.pool() as pool:
         list(pool.map(run, names))
+
+
+# Three cameras, and pairs until the map is full of key frames.
+DIGESTED, PAIRS = ("kitti:06", "euroc:MH_01_half", "karlsruhe:19"), 30
+
+
+def numbers(state, pose):
+    """Of a pair: its pose, and standard deviations and correlations of motion and pose; rounded, as the last bits depend on the compiler."""
+    yield from numpy.round(pose[:3].ravel(), 8) + 0.0  # no negative zero
+    for covariance in (state.motion, state.pose):
+        sigmas = numpy.sqrt(numpy.diag(covariance))
+        yield from (float(f"{sigma:.5e}") for sigma in sigmas)
+        yield from numpy.round((covariance / numpy.outer(sigmas, sigmas) if sigmas.all() else covariance).ravel(), 5) + 0.0
+
+
+def digest():
+    """SHA-256, the same where states, poses and covariances are. The words of a reason do not count."""
+    found = hashlib.sha256()
+    with tempfile.TemporaryDirectory() as work:
+        for name in DIGESTED:
+            run = odometry.run(drives.named(name, pathlib.Path(work)).directory, "--frames", str(PAIRS))
+            for state, pose in zip(run.states, run.poses):
+                found.update(f"{state.state} {state.epoch} {state.moved} {[float(x) for x in numbers(state, pose)]}\n".encode())
+    return found.hexdigest()
 
 
 def read(directory, name):
@@ -81,7 +108,7 @@ def count():
 
 
 def options(parser):
-    actions = parser.add_subparsers(dest="action", metavar="record|compare|count")
+    actions = parser.add_subparsers(dest="action", metavar="record|compare|digest|count")
     actions.required = True
     action = actions.add_parser("record", help="runs drives")
     action.add_argument("directory")
@@ -89,10 +116,13 @@ def options(parser):
     action = actions.add_parser("compare", help="exits 1 where anything differs")
     action.add_argument("before")
     action.add_argument("after")
+    actions.add_parser("digest", help="SHA-256 of the first pairs of three recorded drives")
     actions.add_parser("count", help="numbers of src/odometry")
 
 
 def main(arguments):
     if arguments.action == "record":
         return record(arguments.directory, arguments.drives)
+    if arguments.action == "digest":
+        return print(digest())
     return compare(arguments.before, arguments.after) if arguments.action == "compare" else count()

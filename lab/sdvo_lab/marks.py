@@ -1,4 +1,5 @@
-"""Tables in Markdown: printed row by row as they are measured, and put between the marks of a page."""
+"""Tables in Markdown: printed row by row as they are measured, and put between the marks of a page. The last line before the end mark may
+have the commit whose programs measured the table."""
 import re
 import sys
 
@@ -7,6 +8,7 @@ from .programs import ROOT
 ACCURACY = PERFORMANCE = SELF_CHECK = ROOT / "docs/precision.md"
 FAULTS = ROOT / "lab/docs/faults.md"
 RENDERED = ROOT / "lab/docs/rendered_drives.md"
+PLACES = ROOT / "lab/docs/places.md"
 EXPERIMENTS = ROOT / "lab/docs/experiments.md"
 
 
@@ -20,13 +22,32 @@ def lines(rows):
     return [line(head), line(["---"] * len(head)), *map(line, body)]
 
 
+def pattern(name):
+    """Of all between <!-- name --> and the next <!-- end -->: the lines, and the line of their commit if there is one."""
+    return re.compile(rf"(?<=<!-- {re.escape(name)} -->)(.*?)(?:\n\n\*Commit (\w+)\.\*)?(?=\n<!-- end -->)", re.DOTALL)
+
+
+def names(text):
+    return [name for name in re.findall(r"^<!-- ([a-z ]+) -->$", text, re.MULTILINE) if name != "end"]
+
+
 def between(text, name, block):
-    """The text with other lines between <!-- name --> and the next <!-- end -->."""
-    new = f"<!-- {name} -->\n" + "\n".join(block) + "\n<!-- end -->"
-    text, count = re.subn(rf"<!-- {re.escape(name)} -->\n.*?<!-- end -->", lambda _: new, text, flags=re.DOTALL)
+    """The text with other lines between <!-- name --> and the next <!-- end -->. The commit of other lines goes."""
+    new = "".join("\n" + row for row in block)
+    text, count = pattern(name).subn(lambda match: match.group() if match.group(1) == new else new, text)
     if count == 0:
         print(f"not written: the page has no mark <!-- {name} -->", file=sys.stderr)
     return text
+
+
+def commit(text, name):
+    """Of a table; None where it has none."""
+    found = pattern(name).search(text)
+    return found and found.group(2)
+
+
+def with_commit(text, name, hexadecimal):
+    return pattern(name).sub(lambda match: f"{match.group(1)}\n\n*Commit {hexadecimal}.*", text)
 
 
 def put(page, name, block):

@@ -1,5 +1,5 @@
 """Which revisits are recognised, what is a false loop and what drift is taken back, on long rendered drives along KITTI's ways
-and on the recorded ones: a table of docs/places.md. The rendered ones also as if of cameras with a focal length 1 % longer: turns come
+and on the recorded ones: the table of lab/docs/places.md. The rendered ones also as if of cameras with a focal length 1 % longer: turns come
 out too small."""
 import re
 import tempfile
@@ -30,6 +30,9 @@ def recognise(name, directory, truth):
     return [name, pairs, f"{float(length):.0f}", *counts, f"{t} m, {r}°", f"{before} → {after}", cpu, longest]
 
 
+OF_THE_PAGE = 9  # columns
+
+
 def rows(work, folder, frames):
     yield ["drive", "pairs", "m", "revisits", "recognised", "loops", "false", "worst loop", "ATE [m]", "CPU [ms a pair]",
            "longest optimisation [ms]"]
@@ -45,8 +48,12 @@ def rows(work, folder, frames):
 def options(parser):
     parser.add_argument("--frames", type=int, help="pairs of each rendered drive [default: all]")
     drives.add_rendered(parser)
+    marks.add_write(parser, marks.PLACES)
 
 
 def main(arguments):
+    of_page = []
     with drives.folders(arguments) as (work, folder):
-        marks.show(rows(work, folder, arguments.frames))
+        marks.show(of_page.append(row[:OF_THE_PAGE]) or row for row in rows(work, folder, arguments.frames))
+    if arguments.write:
+        marks.put(arguments.write, "places", marks.lines(of_page))

@@ -2,12 +2,12 @@
 bootstrap over drives. Tables whose files are missing are left out.
 
     lab/run tables                                  # those of lab/docs/experiments, printed
-    lab/run tables out --write                      # puts them between the marks of the page
+    lab/run tables out --write                      # puts them between the marks of the page, and their CSV files into lab/docs/experiments
     lab/run tables --check                          # exits 1 where the page has others
     lab/run tables out --headlines-of lab/docs/experiments  # exits 1 where a headline lies outside of the interval in out"""
 import math
 import pathlib
-import re
+import shutil
 import sys
 
 from . import bootstrap, marks, programs, results
@@ -142,12 +142,20 @@ def tables_of(folder):
 
 
 def page_with(parts, page):
-    for name in re.findall(r"^<!-- ([a-z ]+) -->$", page, re.MULTILINE):
+    for name in marks.names(page):
         if name in parts:
             page = marks.between(page, name, parts[name])
-        elif name != "end":
+        else:
             print(f"left as it is, its files are missing: {name}", file=sys.stderr)
     return page
+
+
+def keep(folder):
+    """Another folder's rows by drive in place of those that stand beside the page."""
+    for path in COMMITTED.rglob("*.csv"):
+        new = folder / path.relative_to(COMMITTED)
+        if new.exists() and not new.samefile(path):
+            shutil.copyfile(new, path)
 
 
 def outside(old, new):
@@ -175,6 +183,7 @@ def main(arguments):
         return None if page_with(parts, page) == page else f"error: the tables of {marks.EXPERIMENTS} are not those of {arguments.folder}"
     if arguments.write:
         arguments.write.write_text(page_with(parts, page))
+        keep(arguments.folder)
     elif arguments.headlines_of:
         return outside(arguments.headlines_of, arguments.folder)
     else:
