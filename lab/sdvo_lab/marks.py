@@ -34,7 +34,7 @@ def names(text):
 def between(text, name, block):
     """The text with other lines between <!-- name --> and the next <!-- end -->. The commit of other lines goes."""
     new = "".join("\n" + row for row in block)
-    text, count = pattern(name).subn(lambda match: match.group() if match.group(1) == new else new, text)
+    text, count = pattern(name).subn(lambda match: match.group() if match.group(1) == new else new, text, count=1)
     if count == 0:
         print(f"not written: the page has no mark <!-- {name} -->", file=sys.stderr)
     return text
@@ -47,7 +47,7 @@ def commit(text, name):
 
 
 def with_commit(text, name, hexadecimal):
-    return pattern(name).sub(lambda match: f"{match.group(1)}\n\n*Commit {hexadecimal}.*", text)
+    return pattern(name).sub(lambda match: f"{match.group(1)}\n\n*Commit {hexadecimal}.*", text, count=1)
 
 
 def put(page, name, block):

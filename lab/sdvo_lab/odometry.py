@@ -52,11 +52,15 @@ def run(directory, *arguments, tools=programs.TOOLS):
 
 
 def errors(truth, estimate, lengths):
-    """What evaluate_trajectory writes of poses, a file or a stack of them, as a dictionary."""
+    """What evaluate_trajectory writes of poses, each a file or a stack of them, as a dictionary."""
     with tempfile.TemporaryDirectory() as work:
-        file, result = pathlib.Path(work) / "poses.txt", pathlib.Path(work) / "errors.json"
-        if isinstance(estimate, numpy.ndarray):
-            poses.write(file, estimate)
-            estimate = file
+        def file(given, name):
+            if not isinstance(given, numpy.ndarray):
+                return given
+            poses.write(pathlib.Path(work) / name, given)
+            return pathlib.Path(work) / name
+
+        result = pathlib.Path(work) / "errors.json"
+        truth, estimate = file(truth, "truth.txt"), file(estimate, "poses.txt")
         programs.run("evaluate_trajectory", "--ground-truth", truth, "--estimate", estimate, "--lengths", lengths, "--json", result)
         return json.loads(result.read_text())

@@ -26,7 +26,7 @@ def measure(drive, *params):
     """Errors after FIRST s: t in %, r in deg/m; motions of all pairs that are TRACKING beyond 5 sigma; and what is estimated."""
     run, truth = odometry.run(drive.directory, *params), drive.poses
     first = int(numpy.searchsorted(drive.stamps, drive.stamps[0] + FIRST))
-    found = odometry.errors(truth[first:], run.poses[first:], drive.lengths)
+    found = odometry.errors(truth[first:], run.poses[first:], drive.lengths)["mean"]
     beyond = 0
     for i, state in enumerate(run.states[1:], 1):
         if state.moved and state.state == "TRACKING":
@@ -34,8 +34,8 @@ def measure(drive, *params):
             error = poses.logarithm(poses.relative(motion, true))
             matters = numpy.linalg.norm(error[:3]) > MATTERS[0] + MATTERS[1] * numpy.linalg.norm(true[:3, 3])
             beyond += matters and max(poses.sigmas(error, state.motion)) > 5
-    return Errors(found["translation_error_percent"], found["rotation_error_deg_per_m"], beyond,
-                  f"{run.timing[-1]['readout_ms']} ± {run.timing[-1]['readout_sigma_ms']}")
+    return Errors(found["translation_percent"], found["rotation_deg_per_m"], beyond,
+                  "{:.1f} ± {:.1f}".format(*(float(run.timing[-1][name]) for name in ("readout_ms", "readout_sigma_ms"))))
 
 
 def rows(folder, seed):
