@@ -32,6 +32,7 @@ TEST(OdometryCheck, NamesTheStatesAndTheReasonThatIsMostFrequent) {
 Finding shutter(double told, double measured) {
   OdometryCheck check(told);
   OdometryResult result;
+  result.state = TrackingState::kTracking;
   result.readout = measured, result.readout_sigma = 0.0005;
   check.add(result);
   return check.shutter();
