@@ -60,6 +60,7 @@ void RowReadout::add(const StereoFeatures& features, const MotionHypothesis& fou
   for (int i = 0; i < features.count(); ++i) last_positions_.emplace_back(features.u[i], features.v[i]);
   if (pairs_.size() <= 2 * kAround) return;
   measure();
+  is_compensated_ = isCompensated();
   pairs_.pop_front();
 }
 
@@ -142,13 +143,13 @@ std::optional<RowReadout::Estimate> RowReadout::estimate() const {
   return estimate;
 }
 
-double RowReadout::usableValue() const {
+/// Whether the readout is compensated: from its proof on, until it is no longer significant.
+bool RowReadout::isCompensated() const {
   // Standard deviations (chosen): a global shutter whose rows are off by a pixel reaches 3.8 (Karlsruhe 19, 373 pairs).
   constexpr double kProof = 5.0;
   const auto known = estimate();
-  const bool is_usable =
-      known && known->sigma < kWarn && std::abs(known->value) > std::max(kWarn, kProof * known->sigma);
-  return is_usable ? known->value : 0.0;
+  if (!known || !known->isRolling()) return false;
+  return is_compensated_ || (known->sigma < kWarn && std::abs(known->value) > kProof * known->sigma);
 }
 
 }  // namespace sdvo

@@ -37,8 +37,8 @@ class RowReadout {
   void interrupt() { pairs_.clear(), last_positions_.clear(); }
 
   std::optional<Estimate> estimate() const;
-  /// The estimate, s, once the shutter is certainly rolling and its standard deviation is below kWarn; else 0.
-  double usableValue() const;
+  /// The estimate, s, from when the shutter was certainly rolling and the standard deviation below kWarn; else 0.
+  double usableValue() const { return is_compensated_ ? product_ / information_ : 0.0; }
 
  private:
   /// A point in two successive pairs.
@@ -55,6 +55,7 @@ class RowReadout {
   };
   std::vector<Track> tracksOf(const StereoFeatures& features, const MotionHypothesis& found) const;
   void measure();
+  bool isCompensated() const;
 
   std::deque<Pair> pairs_;                   ///< the last ones; each continues the one before
   std::vector<cv::Point2f> last_positions_;  ///< of all features of the last pair, px
@@ -63,6 +64,7 @@ class RowReadout {
   double information_ = 0.0, product_ = 0.0;
   /// Sums of a pair's information^2, information * product, and product^2, for the standard deviation.
   double information_square_ = 0.0, mixed_ = 0.0, product_square_ = 0.0;
+  bool is_compensated_ = false;
 };
 
 }  // namespace sdvo
