@@ -18,6 +18,7 @@ COMMANDS = {
     "figures": ("figures", "tables of the pages, made anew where the odometry is another one"),
     "golden": ("golden", "poses, states and covariances of two builds"),
     "shutters": ("shutters", "rolling shutters: ignored, estimated, known"),
+    "repeats": ("repeats", "texture that repeats: walls, tiles, racks, fences, stairs"),
     "two-cameras": ("two_cameras", "two cameras of one robot, fused by robot_localization"),
     "guises": ("guises", "a drive turned, cut, spoilt or in another order"),
     "film": ("film", "moving picture of a drive: features and path"),

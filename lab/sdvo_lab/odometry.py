@@ -51,6 +51,21 @@ def run(directory, *arguments, tools=programs.TOOLS):
             return Run(poses.read(estimate), read_states(states), list(csv.DictReader(file)), said)
 
 
+MATTERS = (0.01, 0.03)  # m, and a ratio of the distance: a motion's error that matters
+BEYOND = 5  # standard deviations
+
+
+def motion_errors(run, truth):
+    """Of pairs that are TRACKING: the motion's error in standard deviations, and whether it exceeds BEYOND and matters."""
+    for i, state in enumerate(run.states[1:], 1):
+        if state.moved and state.state == "TRACKING":
+            motion, true = (poses.relative(stack[i - 1], stack[i]) for stack in (run.poses, truth))
+            error = poses.logarithm(poses.relative(motion, true))
+            sigmas = max(poses.sigmas(error, state.motion))
+            matters = numpy.linalg.norm(error[:3]) > MATTERS[0] + MATTERS[1] * numpy.linalg.norm(true[:3, 3])
+            yield sigmas, bool(matters and sigmas > BEYOND)
+
+
 def errors(truth, estimate, lengths):
     """What evaluate_trajectory writes of poses, each a file or a stack of them, as a dictionary."""
     with tempfile.TemporaryDirectory() as work:

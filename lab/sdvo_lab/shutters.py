@@ -8,7 +8,7 @@ import collections
 
 import numpy
 
-from . import drives, marks, odometry, poses
+from . import drives, marks, odometry
 
 # Trajectory, rig, seed, readout in ms, pairs, lengths of sub-paths.
 DRIVES = [("hand_held", "d435_small", 8403, 5, 160, drives.ROOM), ("hand_held", "d435_small", 8401, 10, 160, drives.ROOM),
@@ -17,7 +17,6 @@ DRIVES = [("hand_held", "d435_small", 8403, 5, 160, drives.ROOM), ("hand_held", 
           ("figure_eight", "kitti", 8407, 25, 120, drives.CAR)]
 FIRST = 3.0  # s, left out
 IGNORED = 1e-6  # s: told that the shutter is all but global
-MATTERS = (0.01, 0.03)  # m, and a ratio of the distance: a motion's error that matters
 
 Errors = collections.namedtuple("Errors", "translation rotation beyond estimate")
 
@@ -27,14 +26,7 @@ def measure(drive, *params):
     run, truth = odometry.run(drive.directory, *params), drive.poses
     first = int(numpy.searchsorted(drive.stamps, drive.stamps[0] + FIRST))
     found = odometry.errors(truth[first:], run.poses[first:], drive.lengths)["mean"]
-    beyond = 0
-    for i, state in enumerate(run.states[1:], 1):
-        if state.moved and state.state == "TRACKING":
-            motion, true = (poses.relative(stack[i - 1], stack[i]) for stack in (run.poses, truth))
-            error = poses.logarithm(poses.relative(motion, true))
-            matters = numpy.linalg.norm(error[:3]) > MATTERS[0] + MATTERS[1] * numpy.linalg.norm(true[:3, 3])
-            beyond += matters and max(poses.sigmas(error, state.motion)) > 5
-    return Errors(found["translation_percent"], found["rotation_deg_per_m"], beyond,
+    return Errors(found["translation_percent"], found["rotation_deg_per_m"], sum(is_wrong for _, is_wrong in odometry.motion_errors(run, truth)),
                   "{:.1f} ± {:.1f}".format(*(float(run.timing[-1][name]) for name in ("readout_ms", "readout_sigma_ms"))))
 
 

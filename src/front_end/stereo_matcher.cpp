@@ -113,7 +113,7 @@ class EpipolarSearch {
 
   struct Found {
     cv::Point2f place;  ///< (disparity, dv), px
-    bool has_rival;     ///< another block may be as like, between two pixels
+    float rival;        ///< px along the row to another block that may be as like, between two pixels; 0: none
   };
 
   std::optional<Found> find(const cv::Point2f& left_position) const {
@@ -121,7 +121,7 @@ class EpipolarSearch {
     if (!match) return std::nullopt;
     const std::optional<cv::Point2f> place = refine(images_.right, left_position, match->disparity);
     if (!place) return std::nullopt;
-    return Found{*place, match->has_rival};
+    return Found{*place, static_cast<float>(match->rival)};
   }
 
   /// Distance along the row after which the left image shows the same, px, if the disparity may be off by it; else 0.
@@ -146,7 +146,7 @@ class EpipolarSearch {
  private:
   struct RowMatch {
     int disparity;  ///< px
-    bool has_rival;
+    int rival;      ///< as in Found
   };
 
   std::optional<RowMatch> searchRow(const cv::Point2f& left_position) const {
@@ -168,10 +168,12 @@ class EpipolarSearch {
     const unsigned elsewhere =
         std::min(leastOf(differences.data(), 0, best - kSame), leastOf(differences.data(), best + kSame + 1, count));
     if (least > options_.epipolar.uniqueness * elsewhere) return std::nullopt;
-    // The sums of equal blocks differ by where they lie between pixels, up to this ratio (chosen): the best one may be a
-    // period off.
+    // The sums of equal blocks differ by where they lie between pixels, up to this ratio (chosen): the best one may be
+    // a period off.
     constexpr unsigned kRival = 2;
-    return RowMatch{2 * (best - kNegative), 2 * kRival * least > lowestValley(differences, best).twice_bottom};
+    const LowestValley valley = lowestValley(differences, best);
+    return RowMatch{2 * (best - kNegative),
+                    2 * kRival * least > valley.twice_bottom ? 2 * std::abs(valley.at - best) : 0};
   }
 
   /// (disparity, dv) in the right image, or in another one, from a disparity to 2 px.
@@ -284,18 +286,18 @@ std::vector<StereoMatch> StereoMatcher::match(const cv::Mat& left, const cv::Mat
   });
   std::vector<StereoMatch> matches;
   matches.reserve(found.size());
-  std::vector<std::size_t> with_rival;
+  std::vector<Rival> rivals;
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (!found[i]) continue;
-    const auto& [place, has_rival] = *found[i];
+    const auto& [place, rival] = *found[i];
     if (place.x < options_.min_disparity || std::abs(place.y) > options_.max_epipolar_residual) continue;
     matches.push_back({static_cast<int>(i), place.x, place.y});
-    if (has_rival) with_rival.push_back(matches.size() - 1);
+    if (rival > 0.f) rivals.push_back({matches.size() - 1, rival});
   }
   const auto periodOf = [&](std::size_t i) {
     return search.findPeriod(left_positions[static_cast<std::size_t>(matches[i].left_index)], matches[i].disparity);
   };
-  markRepeated(left_positions, with_rival, periodOf, matches);
+  markRepeated(left_positions, rivals, periodOf, matches);
   return matches;
 }
 

@@ -29,7 +29,7 @@ Pair bays(const std::function<double(double u, double v)>& dirt = [](double, dou
     return texture.at(u - kPeriod * std::floor(u / kPeriod), v) + dirt(u, v);
   };
   Pair pair{synthetic::render(kSize, grey),
-             synthetic::render(kSize, [&](double u, double v) { return grey(u + kNearDisparity, v); })};
+            synthetic::render(kSize, [&](double u, double v) { return grey(u + kNearDisparity, v); })};
   cv::RNG random(3);
   for (cv::Mat* view : {&pair.left, &pair.right}) {
     cv::Mat noise(kSize, CV_16S);
@@ -89,8 +89,42 @@ TEST(RepeatedTexture, TextureThatDoesNotRepeatHasNoPeriod) {
   const synthetic::Texture texture(11, 5.0, 160.0);
   const cv::Mat left = synthetic::render(kSize, texture),
                 right = synthetic::render(kSize, [&](double u, double v) { return texture.at(u + kNearDisparity, v); });
-  for (const StereoMatch& match : StereoMatcher({}).match(left, right, grid()))
-    EXPECT_EQ(match.period, 0.f);
+  for (const StereoMatch& match : StereoMatcher({}).match(left, right, grid())) EXPECT_EQ(match.period, 0.f);
+}
+
+/// Matches of a view whose texture repeats; every 16th has neither a rival nor a period, and `unique_disparity`.
+std::vector<StereoMatch> marked(float unique_disparity, bool has_rivals_without_period = false) {
+  const std::vector<cv::Point2f> positions = grid();
+  std::vector<StereoMatch> matches;
+  std::vector<Rival> rivals;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const bool is_unique = i % 16 == 5;
+    matches.push_back(
+        {static_cast<int>(i), is_unique ? unique_disparity : 31.f + static_cast<float>(i % 3) * 49.f, 0.f});
+    if (!is_unique) rivals.push_back({i, 60.f});
+  }
+  const auto periodOf = [&](std::size_t i) {
+    return i % 16 == 5 || (has_rivals_without_period && i % 5 == 2) ? 0.f : 49.f;
+  };
+  markRepeated(positions, rivals, periodOf, matches);
+  return matches;
+}
+
+TEST(RepeatedTexture, AMatchAmongPeriodsBelowItsDisparityIsACoincidence) {
+  for (const StereoMatch& match : marked(80.f)) EXPECT_GT(match.period, 0.f) << match.left_index;
+}
+
+TEST(RepeatedTexture, AMatchWhoseDisparityIsBelowThePeriodsAroundIsUnique) {
+  const std::vector<StereoMatch> matches = marked(12.f);
+  for (std::size_t i = 5; i < matches.size(); i += 16) EXPECT_EQ(matches[i].period, 0.f) << i;
+}
+
+TEST(RepeatedTexture, ARivalIsAsGoodAsAPeriod) {
+  const std::vector<StereoMatch> matches = marked(12.f, true);
+  for (std::size_t i = 2; i < matches.size(); i += 5)
+    if (i % 16 != 5) {
+      EXPECT_EQ(matches[i].period, 60.f) << i;
+    }
 }
 
 TEST(RepeatedTexture, WhereItFillsTheViewTheRangeOfDisparitiesThatDecidesIsSaid) {
