@@ -109,7 +109,9 @@ TEST(RightRotation, VectorsGiveWhatThePlainFormGives) {
   for (int steps = 1; steps <= 3; ++steps) {
     const RightRotation plain = plainRotation(camera, noise, correspondences, Eigen::Isometry3d::Identity(), steps);
     nearest = std::min(nearest, (found->value - plain.value).norm() / plain.value.norm());
-    if (steps == 3) EXPECT_LT((found->covariance - plain.covariance).norm(), 0.05 * plain.covariance.norm());
+    if (steps == 3) {
+      EXPECT_LT((found->covariance - plain.covariance).norm(), 0.05 * plain.covariance.norm());
+    }
   }
   EXPECT_LT(nearest, 1e-9);
 }
