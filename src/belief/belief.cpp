@@ -54,7 +54,8 @@ void Doubt::raise(const std::vector<Evidence>& evidence) {
 }
 
 void Doubt::fade() {
-  // Pairs: half of kLastingSightings, after which points that began in the doubt are lasting, and new evidence.
+  // In pairs, half of kLastingSightings: points that began in the doubt are lasting after so many sightings, and then
+  // count as new evidence.
   constexpr double kHalfLife = 0.5 * MotionHypothesis::kLastingSightings;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
   if (!lasts()) distance_ = angle_ = largest_ = 0.0;

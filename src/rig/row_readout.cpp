@@ -136,6 +136,7 @@ std::optional<RowReadout::Estimate> RowReadout::estimate() const {
   if (!(information_ > 0.0)) return std::nullopt;
   const double value = product_ / information_;
   const double pairs = information_ * information_ / information_square_;  // effective number (Kish 1965)
+  if (!(pairs > 1.0)) return std::nullopt;                                 // one pair has no spread
   const double spread = product_square_ - 2.0 * value * mixed_ + value * value * information_square_;
   const double sigma = std::sqrt(std::max(spread, 0.0) * studentRatio(pairs)) / information_;
   const Estimate estimate{value, std::hypot(sigma, kModel * value)};

@@ -40,8 +40,8 @@ struct NoiseOptions {
   /// The largest distance of a corner from its point, in each direction.
   double cornerGate() const { return corner * std::sqrt(noiseGate(1)); }
 
-  /// Standard deviation of a corner that no patch confirms: it lies anywhere in a disc with u_left and u_right within
-  /// the gate.
+  /// Standard deviation, in each direction, of a corner that no patch confirms, px. It may lie anywhere in the disc
+  /// where u_left and u_right are within the gate.
   double unconfirmedCorner() const { return inlierGate() / std::sqrt(8.0); }
 };
 
