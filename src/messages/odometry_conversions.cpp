@@ -129,6 +129,7 @@ stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result,
   info.right_delay_sigma = static_cast<float>(result.right_delay_sigma);
   info.readout = static_cast<float>(result.readout);
   info.readout_sigma = static_cast<float>(result.readout_sigma);
+  info.used_readout = static_cast<float>(result.used_readout);
   for (int axis = 0; axis < 3; ++axis) {
     info.right_rotation[axis] = static_cast<float>(result.right_rotation[axis]);
     info.right_rotation_sigma[axis] = static_cast<float>(result.right_rotation_sigma[axis]);

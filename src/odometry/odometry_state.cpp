@@ -158,6 +158,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
   result.match_time = found.match_time;
   result.motion_time = found.motion_time + step.time;
   reportRig(rig, result);
+  result.used_readout = shutter.readout();
   return result;
 }
 

@@ -9,6 +9,7 @@
 
 #include "../common/stopwatch.hpp"
 #include "../common/text.hpp"
+#include "../rig/rolling_shutter.hpp"
 #include "loop_agreement.hpp"
 #include "place_index.hpp"
 #include "place_verifier.hpp"
@@ -24,6 +25,15 @@ Matrix6d unknown() {
   return isotropic(1000.0 * 1000.0, 10.0 * 10.0);
 }
 
+/// The features of a rolling shutter as a global one sees them at the stamp, without those that it does not see.
+StereoFeatures atStamp(const StereoFeatures& taken, const CameraMotion& motion) {
+  const StereoFeatures global = RollingShutter::asGlobal({taken, motion.readout, motion.velocity});
+  std::vector<int> seen;
+  for (int i = 0; i < global.count(); ++i)
+    if (global.camera.sees({global.u[i], global.v[i], global.u[i] - global.disparity[i]})) seen.push_back(i);
+  return global.select(seen);
+}
+
 }  // namespace
 
 struct PlaceRecognition::Tools {
@@ -37,11 +47,11 @@ PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options)
 PlaceRecognition::PlaceRecognition(PlaceRecognition&&) noexcept = default;
 PlaceRecognition::~PlaceRecognition() = default;
 
-std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& features, const CameraMotion& motion) {
-  features.check();
-  if (!places_.empty() && features.count() > 0 && features.kind() != places_.begin()->second.features.kind())
+std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& taken, const CameraMotion& motion) {
+  taken.check();
+  if (!places_.empty() && taken.count() > 0 && taken.kind() != places_.begin()->second.features.kind())
     throw std::invalid_argument("the places are described by " + toString(places_.begin()->second.features.kind()) +
-                                ", not by " + toString(features.kind()));
+                                ", not by " + toString(taken.kind()));
   // The path since the last key frame.
   if (way_.T_odom_camera) {
     const Eigen::Isometry3d T_previous_current = way_.T_odom_camera->inverse() * motion.T_odom_camera;
@@ -53,12 +63,12 @@ std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& featu
   }
   way_.known &= motion.continuous;
   way_.T_odom_camera = motion.T_odom_camera;
-  if (!isKeyframe(features)) return std::nullopt;
+  if (!isKeyframe(taken)) return std::nullopt;
 
   PlaceReport report;
   report.id = next_id_;
   Stopwatch stopwatch;
-  const StereoFeatures kept = thinOut(features, options_.max_features);
+  const StereoFeatures kept = thinOut(motion.readout != 0.0 ? atStamp(taken, motion) : taken, options_.max_features);
   const PlaceSignature signature = tools_->index.signature(kept);
   addKeyframe(kept, next_id_++);
   const Place& here = places_.at(report.id);

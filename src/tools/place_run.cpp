@@ -31,7 +31,9 @@ void PlaceRun::process(const StereoFeatures& features, const OdometryResult& odo
                     odometry.has_pose || pairs_.empty() ? odometry.T_origin_camera : pairs_.back().T_odom_camera});
   if (!odometry.has_pose) return;
   const std::clock_t cpu_before = std::clock();
-  const CameraMotion motion{odometry.T_origin_camera, odometry.motion_covariance, odometry.has_motion || !had_pose_};
+  CameraMotion motion{odometry.T_origin_camera, odometry.motion_covariance, odometry.has_motion || !had_pose_};
+  motion.readout = odometry.used_readout;
+  if (odometry.has_motion) motion.velocity = logSE3(odometry.T_previous_current) / odometry.dt;
   had_pose_ = true;
   const auto report = recognition_.observe(features, motion);
   if (report && report->loop) {

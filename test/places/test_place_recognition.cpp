@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "../../src/rig/rolling_shutter.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
@@ -128,6 +131,24 @@ TEST(PlaceRecognition, APairWithHardlyAnythingToSeeIsNotKept) {
   PlaceRecognition recognition{PlaceRecognitionOptions()};
   EXPECT_FALSE(recognition.observe(synthetic::noFeatures(synthetic::camera(), 1), {}).has_value());
   EXPECT_TRUE(recognition.observe(see(onCircle(0.0), 2), {}).has_value());
+}
+
+TEST(PlaceRecognition, RowsOfARollingShutterAreKeptAsOfTheStamp) {
+  const StereoFeatures taken = see(onCircle(0.0), kPeriod);
+  CameraMotion motion;
+  motion.readout = 0.025;
+  motion.velocity << 0.0, 0.0, 10.0, 0.0, 5.0, 0.0;
+  const StereoFeatures global = RollingShutter::asGlobal({taken, motion.readout, motion.velocity});
+  PlaceRecognition recognition(Drive::fewAndFast());
+  recognition.observe(taken, motion);
+  const StereoFeatures& kept = recognition.places().at(0).features;
+  EXPECT_GT(kept.count(), 100);
+  EXPECT_NO_THROW(kept.check()) << "what left the image cannot be saved and loaded";
+  for (int i = 0; i < kept.count(); ++i) {
+    const auto same = std::find(global.u.begin(), global.u.end(), kept.u[static_cast<std::size_t>(i)]);
+    ASSERT_NE(same, global.u.end());
+    EXPECT_EQ(kept.v[static_cast<std::size_t>(i)], global.v[static_cast<std::size_t>(same - global.u.begin())]);
+  }
 }
 
 TEST(PlaceRecognition, RecentPlacesAreNotLookedFor) {

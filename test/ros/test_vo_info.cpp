@@ -28,6 +28,7 @@ TEST(ToInfo, TellsResultAndImageSide) {
   result.right_delay_sigma = 0.0001;
   result.readout = 0.025;
   result.readout_sigma = 0.0004;
+  result.used_readout = 0.026;
   result.right_rotation << 0.001, -0.002, 0.003;
   FeaturesMessage features = someMessage();
   features.dropped_pairs = 6;
@@ -61,6 +62,7 @@ TEST(ToInfo, TellsResultAndImageSide) {
   EXPECT_FLOAT_EQ(info.right_delay_sigma, 0.0001f);
   EXPECT_FLOAT_EQ(info.readout, 0.025f);
   EXPECT_FLOAT_EQ(info.readout_sigma, 0.0004f);
+  EXPECT_FLOAT_EQ(info.used_readout, 0.026f);
   EXPECT_FLOAT_EQ(info.right_rotation[1], -0.002f);
 
   result.matches = result.inliers = 0;

@@ -43,6 +43,8 @@ struct CameraMotion {
   Matrix6d covariance =
       Matrix6d::Zero();    ///< of the motion since the pair before: of its right perturbation, m and rad
   bool continuous = true;  ///< false: the motion since the pair before is unknown (a new epoch)
+  double readout = 0.0;    ///< s, of rolling shutters: by it and the velocity, rows are moved to the stamp
+  Vector6d velocity = Vector6d::Zero();  ///< in the camera's frame, m/s and rad/s
 };
 
 /// Result for a new key frame.
@@ -69,7 +71,7 @@ class PlaceRecognition {
   /// that takes long and may be done on a copy meanwhile (graph(), PoseGraph::optimise(), adopt()). Throws
   /// std::invalid_argument, and adds no place, for descriptors that are not binary or of another kind than those
   /// before. The caller ensures that the camera is the same.
-  std::optional<PlaceReport> observe(const StereoFeatures& features, const CameraMotion& motion);
+  std::optional<PlaceReport> observe(const StereoFeatures& taken, const CameraMotion& motion);
 
   const PoseGraph& graph() const { return graph_; }
   bool adopt(const PoseGraph& optimised) { return graph_.adopt(optimised); }

@@ -51,9 +51,12 @@ std::optional<PlaceReport> PlaceSession::observe(const OdometryPair& pair, const
   motion.T_odom_camera = T_odom_base * T_base_camera;
   motion.continuous = continues_ && last_ && pair.info->session == last_->session && pair.info->epoch == last_->epoch &&
                       pair.resumes == last_->resumes;
-  if (motion.continuous)
-    motion.covariance =
-        ros_conversions::toMotionCovariance(*pair.odometry, secondsBetween(last_->stamp, stamp), T_base_camera);
+  motion.readout = pair.info->used_readout;
+  if (motion.continuous) {
+    const double dt = secondsBetween(last_->stamp, stamp);
+    motion.covariance = ros_conversions::toMotionCovariance(*pair.odometry, dt, T_base_camera);
+    motion.velocity = logSE3((last_->T_odom_base * T_base_camera).inverse() * motion.T_odom_camera) / dt;
+  }
   std::optional<PlaceReport> report = recognition_.observe(features, motion);
   last_ = {stamp, pair.info->session, pair.info->epoch, pair.resumes, features.camera, T_odom_base};
   continues_ = true;
