@@ -34,7 +34,7 @@ struct Belief {
 };
 
 /// Carried doubt: log-odds from earlier pairs that the motion is not the camera's, or that the map is wrong. A doubt is
-/// one event. It ends when it has faded, or when lasting points, confirmed before it, refute it.
+/// one event. It ends when it has faded, or when lasting points refute it.
 class Doubt {
  public:
   double logOdds() const { return log_odds_; }
@@ -45,8 +45,8 @@ class Doubt {
   Belief update(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence);
   /// Adds the evidence of a pair without a measured motion.
   void raise(const std::vector<Evidence>& evidence);
-  /// Lets the doubt fade after a pair: a mover may leave the view.
-  void fade();
+  /// Lets the doubt fade over so many seconds: a mover may leave the view.
+  void fade(double seconds);
 
  private:
   /// Alternatives to a measured motion, and the log-odds of two of them.

@@ -163,10 +163,10 @@ class Explanations {
       if (explained_[a][i] != explained_[b][i]) (explained_[a][i] ? sightings_a : sightings_b) += sightings_[i];
     const Points only_a = explainedBy(a, b), only_b = explainedBy(b, a);
     const int points = static_cast<int>(only_a.size() + only_b.size());
-    const double likelihood_a = logLikelihood(sightings_b, points), likelihood_b = logLikelihood(sightings_a, points);
-    // Numbers are no evidence if the image is torn.
-    if (areTorn(a, b)) return std::log((std::exp(likelihood_a) + kTorn) / (std::exp(likelihood_b) + kTorn));
-    if (isObject(only_a, only_b) || isObject(only_b, only_a)) return likelihood_a - likelihood_b;
+    const double log_a = logLikelihood(sightings_b, points), log_b = logLikelihood(sightings_a, points);
+    // If the image is torn, either side may be the camera's with odds of kTorn at least, however few its points are.
+    if (areTorn(a, b)) return std::log((std::exp(log_a) + kTorn) / (std::exp(log_b) + kTorn));
+    if (isObject(only_a, only_b) || isObject(only_b, only_a)) return log_a - log_b;
     return kLogOddsOfSighting * (sightings_a - sightings_b);  // scattered points have independent errors
   }
 
@@ -276,6 +276,7 @@ PlaceBelief choosePlace(const FoundPlace& place, const std::vector<ExpectedMotio
   if (place.alike)
     belief.mixture.add({logWeight(other) - logWeight(chosen), momentOf(logSE3(chosen * other.inverse())),
                         "other places of the map look alike"});
+  // The map matches by chance, and the camera moved as the prior says.
   for (const ExpectedMotion& expected : prior)
     belief.mixture.add({std::log(kTailProbability * place.chance) - logWeight(chosen),
                         momentOf(expected.innovation(chosen.inverse())) + expected.covariance,
@@ -293,9 +294,11 @@ void MotionHypothesis::replaceMotion(const MotionScene& scene, const Eigen::Isom
   const Eigen::Isometry3d T_found = std::exchange(motion.T_current_reference, T_current_reference);
   const Eigen::Isometry3d apart = T_current_reference * T_found.inverse();
   const int points = static_cast<int>(motion.inliers.size());
-  double own = 0.0, others = 0.0;
-  for (const int i : motion.inliers) (contains(dropped, matches[i].current) ? others : own) += sightingsOf(i);
-  const double found_is_right = probabilityOf(logLikelihood(own, points) - logLikelihood(others, points));
+  double kept_sightings = 0.0, dropped_sightings = 0.0;
+  for (const int i : motion.inliers)
+    (contains(dropped, matches[i].current) ? dropped_sightings : kept_sightings) += sightingsOf(i);
+  const double found_is_right =
+      probabilityOf(logLikelihood(kept_sightings, points) - logLikelihood(dropped_sightings, points));
   rivals_moment += found_is_right * momentOf(logSE3(apart));
   if (isTolerable(scene, T_current_reference, apart)) return;
   probability *= 1.0 - found_is_right;

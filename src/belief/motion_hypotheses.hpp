@@ -82,8 +82,9 @@ struct MotionHypothesis {
   };
   std::optional<Rival> rival;
   Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad
-  /// Input of Noise::learnShared(): squared Mahalanobis distance, for independent points, between the motion of the
-  /// lasting inliers and that of all. None if it is significant: the lasting points' motion is then taken.
+  /// Input of Noise::learnShared(): how far the motion of the lasting inliers is from that of all inliers, as a squared
+  /// Mahalanobis distance under independent errors of points. None if it is significant: the lasting points' motion is
+  /// then taken.
   std::optional<double> lasting_square;
 
   /// Confirmed sightings of a match's point, four at most.

@@ -87,7 +87,7 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
   if (scene.guess && scene.T_current_reference)
     hypotheses.push_back(search(wide_matcher_, scene, view, scene.T_current_reference));
   if (expected) hypotheses.push_back(search(matcher_, scene, view, std::nullopt));
-  const MotionHypothesis all = hypotheses.back();
+  const MotionHypothesis all = hypotheses.back();  // without a prediction: it has the most matches
   std::vector<int> lasting, rest;
   for (int i = 0; i < static_cast<int>(all.matches.size()); ++i) {
     if (all.isLasting(i)) lasting.push_back(i);

@@ -86,7 +86,8 @@ class PoseCovariance {
   void markKeyframe();
 
  private:
-  /// Derivatives by the rig; last column: minus the sum of derivative times compensated rig.
+  /// Derivatives of a pose by the rig; last column: minus what the compensated rig has contributed. The error is then
+  /// derivative * rig + last column.
   using Exposure = Eigen::Matrix<double, 6, RigEstimate::kParameters + 1>;
 
   static Matrix6d momentOf(const Exposure& exposure, const RigEstimate& known);

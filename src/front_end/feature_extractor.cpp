@@ -12,6 +12,7 @@
 #include "depth_scale.hpp"
 #include "exposure_balance.hpp"
 #include "feature_detector.hpp"
+#include "image_noise.hpp"
 #include "patch_cutter.hpp"
 #include "repeated_texture.hpp"
 #include "rig_monitor.hpp"
@@ -196,6 +197,7 @@ StereoFeatures FeatureExtractor::Impl::extract(const StereoCamera& camera, const
   const std::vector<Corner> corners = detector_.detect(left, border, mask);
   report.detected = static_cast<int>(corners.size());
   measureImage(left, report.mean_intensity[0], report.sharpness[0]);
+  report.noise = noiseOf(left);
   report.detect_time = stopwatch.lap();
   measureImage(right, report.mean_intensity[1], report.sharpness[1]);
 

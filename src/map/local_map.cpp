@@ -170,7 +170,7 @@ void LocalMap::renewAppearance(const StereoFeatures& features, const std::vector
 
 void LocalMap::discountNewest() {
   for (Point& point : points_)
-    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId()) --point.seen;
+    if (point.seen > 1 && point.observations.back().frame_id == newestId()) --point.seen;
 }
 
 void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int feature) {

@@ -16,6 +16,7 @@ namespace {
 std::optional<double> commonSquare(const EliminatedPoint& point) {
   constexpr int kFewest = 4;
   if (point.observations < kFewest) return std::nullopt;
+  // Ratio of a common disparity error that the point's position takes over.
   const double followed = (point.R * point.disparity_by_point).squaredNorm() / point.weight;
   if (followed > 0.5) return std::nullopt;
   const double mean = point.disparity_residual / point.weight;

@@ -39,6 +39,7 @@ void forEachField(Message& message, Features& features, const Assign& assign) {
     assign(message.mean_intensity[side], report.mean_intensity[side]);
     assign(message.sharpness[side], report.sharpness[side]);
   }
+  assign(message.noise, report.noise);
   assign(message.detect_time, report.detect_time);
   assign(message.stereo_time, report.stereo_time);
   assign(message.describe_time, report.describe_time);

@@ -90,6 +90,9 @@ struct OdometryState {
 
   OdometryState(const VisualOdometryOptions& options, int first_epoch);
 
+  /// Since the last pair, s; there has to be one. `stamp`: ns.
+  double secondsUntil(std::int64_t stamp) const { return static_cast<double>(stamp - *last_stamp) * 1e-9; }
+
   /// The estimates of the rig start anew.
   void forgetRig(const VisualOdometryOptions& options);
   /// The rig walked by a random step after it was `known`.

@@ -17,7 +17,7 @@ double largestDoubt(const TrackingOptions& tracking) {
 PairSearch::PairSearch(const VisualOdometryOptions& options, const SearchTools& tools, const OdometryState& state,
                        const StereoFeatures& given, const std::optional<MotionGuess>& guess)
     : options_(options), tools_(tools), state_(state), given_(given), guess_(guess) {
-  if (state.last_stamp) dt_ = static_cast<double>(given.stamp - *state.last_stamp) * 1e-9;
+  if (state.last_stamp) dt_ = state.secondsUntil(given.stamp);
   searchBy(given.camera);
   if (kind_ != kContinues || !state.lens || !state.lens->isLike(given.camera) || !movesFeatures(*state.lens)) return;
   // Either the lens moved, or camera_info changed without it: a fault of the driver, or a new calibration.
@@ -67,8 +67,8 @@ bool PairSearch::movesFeatures(const StereoCamera& before) const {
   return false;
 }
 
-/// Of the motion that is found, by its inliers' aligned positions, up to a constant. The map's points err as much as
-/// the pair's; a wrong match costs the gate.
+/// Of the motion that is found, by its inliers' aligned positions, up to a constant. A wrong match costs the gate. All
+/// counts half, for the map's points err as much as the pair's.
 double PairSearch::logLikelihood() const {
   const StereoCamera& camera = features().camera;
   const NoiseOptions& noise = options_.noise;
@@ -96,7 +96,8 @@ std::optional<Eigen::Isometry3d> PairSearch::expectedMotion(const std::optional<
 }
 
 /// Log-odds that images repeat although the camera moved. The guess, or the last motion, implies whether it did. A
-/// robot may stop from one pair to the next as far as the prior allows; the first repeated pair decides.
+/// robot may stop from one pair to the next as far as the prior allows; unless images show noise, the first repeated
+/// pair decides.
 double PairSearch::logOddsOfFrozen() const {
   const StereoFeatures& features = taken();
   const RepeatedImages& images = state_.images;
@@ -113,9 +114,10 @@ double PairSearch::logOddsOfFrozen() const {
   const auto expected = expectedMotion(std::nullopt);
   if (!prior || !moved(expected.value_or(prior->motion))) return kUnsuspected;
   if (images.comeTwice()) return kCertain;
-  if (images.inARow() > 0 && images.logOddsOfOld() < kCertain) return kUnsuspected;
+  const double old = images.logOddsOfOld(features.report.noise);
+  if (images.inARow() > 0 && !(old > 0.0)) return kUnsuspected;
   const double stop = 0.5 * prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero());
-  return std::min(images.logOddsOfOld() + std::min(stop, -std::log(kTailProbability)), kCertain);
+  return std::min(old + std::min(stop, -std::log(kTailProbability)), kCertain);
 }
 
 /// Features as of a right camera that did not rotate and is synchronous.

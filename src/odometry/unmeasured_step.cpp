@@ -69,7 +69,7 @@ OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures
                                                                  : " where the guess has the camera"),
                                      state);
     if (has_map) return step;
-    if (guessed->rotation_only) ++state.epoch;
+    if (guessed->rotation_only) ++state.epoch;  // the position is not known
     state.useFallbackMap();
     return step;
   }
@@ -89,6 +89,7 @@ OdometryStep holdPose(double dt, OdometryState& state) {
                     ? "each pair comes twice: is the driver's rate above the sensor's?"
                     : "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
   step.T_previous_current = Eigen::Isometry3d::Identity();
+  // Velocities of successive steps are correlated: the pose gets what this step adds to all, the motion its own part.
   step.covariance = state.outage.lastStep(state.prior, dt);
   state.covariance.predict(*step.T_previous_current, state.outage.growth(state.prior, dt));
   state.prior.interrupt();

@@ -203,9 +203,10 @@ void VisualOdometry::Impl::takePose(const Matrix6d& covariance) {
 OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
   refuse(given);
   if (guess) guess->check();
+  if (state_.last_stamp) state_.doubt.fade(state_.secondsUntil(given.stamp));
   PairSearch pair(options_, tools_, state_, given, guess);
 
-  // The state has not changed so far, and from here on no input is rejected.
+  // Nothing else of the state has changed so far, and from here on no input is rejected.
   Stopwatch stopwatch;
   begin(pair, guess);
   const std::optional<MeasuredPair> measured = measuredPair(pair);
@@ -219,11 +220,11 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
                    step.state == TrackingState::kTracking && pair.scene());
   finish(pair, step);
   rememberRolled(pair, step);
-  if (options_.calibration.enabled && options_.calibration.readout == 0.0)
-    state_.shutter.setReadout(state_.rig.readout.usableValue());
   step.time = stopwatch.lap();
   const OdometryResult result =
       checkedResult(state_.report(pair.features(), pair.givenIndices(), pair.found(), step, floor()));
+  if (options_.calibration.enabled && options_.calibration.readout == 0.0)
+    state_.shutter.setReadout(state_.rig.readout.usableValue());
   // A driver's fault is short: a calibration that lasts is new.
   if (result.has_pose && pair.refutesCamera() &&
       1e-9 * static_cast<double>(given.stamp - *state_.lens_stamp) > options_.tracking.max_gap)
@@ -502,8 +503,8 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::measure(const MotionHypothesis&
   step.rejected_features = candidate.adjustment.rejected;
   step.T_previous_current = (map.newestPose() * state_.T_origin_camera).inverse();
   if (!candidate.adjustment.success) {
-    step.covariance = found.motion.covariance;
-    state_.covariance.predict(*step.T_previous_current, step.covariance);
+    // It is measured against the map's points all the same.
+    step.covariance = state_.covariance.update(*step.T_previous_current, found.motion.covariance);
     return step;
   }
   step.covariance = state_.covariance.update(*step.T_previous_current, candidate.adjustment.since_keyframe,
@@ -547,12 +548,10 @@ void VisualOdometry::Impl::rememberRolled(PairSearch& pair, Step& step) {
 /// Updates the state by the pair's step.
 void VisualOdometry::Impl::finish(const PairSearch& pair, Step& step) {
   const StereoFeatures& features = pair.features();
-  state_.doubt.fade();
-  const auto stood = [&step] {
-    const Vector6d motion = logSE3(*step.T_previous_current);
-    return mahalanobisSquare(motion, step.covariance) < noiseGate(6);
-  };
-  state_.images.remember(pair.whole(), step.state == TrackingState::kTracking && step.T_previous_current && stood());
+  std::optional<bool> stood;
+  if (step.state == TrackingState::kTracking && step.T_previous_current)
+    stood = mahalanobisSquare(Vector6d(logSE3(*step.T_previous_current)), step.covariance) < noiseGate(6);
+  state_.images.remember(pair.whole(), stood);
   state_.frozen = pair.kind() == PairSearch::kFrozen;
   if (pair.repeatsAPart() && step.reason.empty())
     step.reason = "a part of the left image repeats that of the previous pair";

@@ -25,9 +25,9 @@ class CalibrationFilter {
   /// Adds the process noise of `dt` s, and returns it: the rig warms up or cools down, and its cameras' clocks drift.
   RigEstimate::Matrix predict(double dt);
 
-  /// Calibration before a window's adjustment: estimate(), which has the window up to its last pair. Without it, a rig
-  /// without error keeps half of the options' prior for as long as one key frame stays, and the window follows noise.
-  /// The mean excludes the effect of delay(), for which disparities are compensated already. `shape`: derivative of the
+  /// Calibration before a window's adjustment: estimate(), which knows what the same window showed up to its last pair.
+  /// While one key frame stays, a prior without that would remain as wide as in the beginning, and the window would
+  /// follow noise. The mean excludes the effect of delay(), for which disparities are compensated already. `shape`: derivative of the
   /// calibration by the rig.
   CalibrationBelief prior(const RigEstimate::Shape& shape) const;
 
@@ -76,7 +76,8 @@ class CalibrationFilter {
   RigCalibration calibration_;
   RigEstimate::Vector compensated_;  ///< the rig, by the last window
   Likelihood past_;                  ///< of windows that share no pair with the last one
-  /// past_ with a window up to pair `next_past_id_`; becomes past_ for windows that begin after that pair.
+  /// past_ and a window that ended with pair `next_past_id_`. It becomes past_ with the first window that begins later,
+  /// as no pair is then counted twice.
   Likelihood next_past_;
   int next_past_id_ = -1;
   std::optional<Likelihood> present_;                                   ///< of past_ and the last window

@@ -94,11 +94,18 @@ RigEstimate::Matrix LearntRig::rotate(const RotationHypothesis& new_rotation, co
     return RigEstimate::Matrix::Zero();
   }
   rotation = now, rotation_covariance = covariance;
+  rotated_last_ = true;
   return calibration.widen(camera, new_rotation.covariance);
 }
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
                       const RotationHypothesis& new_rotation, bool is_confirmed) {
+  if (!(new_rotation.log_odds > 0.0) && std::exchange(rotated_last_, false) && !measured &&
+      found.agreement.matches >= kFewestMeasured) {
+    const Eigen::Vector3d back = rotation - rotation_before_;
+    rotation_noise_ += back * back.transpose();
+    rotation = rotation_before_, rotation_covariance = covariance_before_;
+  }
   log_prior_of_other_moment_ = features.report.refused ? kUnsuspected : log_prior_of_other_moment_ - std::log(2.0);
   if (is_confirmed) {
     rotation_noise_ += (1.0 - kUsualMemory) * (new_rotation.value * new_rotation.value.transpose() - rotation_noise_);

@@ -11,7 +11,7 @@
 namespace sdvo {
 namespace {
 
-/// Nats that label each of `all` things, `some` of which are of one kind.
+/// Nats that it takes to say which `some` of `all` things are of one kind.
 double entropyOf(int some, int all) {
   const auto nats = [all](int n) { return n > 0 ? n * std::log(static_cast<double>(all) / n) : 0.0; };
   return nats(some) + nats(all - some);
@@ -41,9 +41,13 @@ bool RepeatedImages::shouldHaveMoved(const StereoFeatures& features, double nois
   return 2 * std::count(moved.begin(), moved.end(), true) > features.count();
 }
 
-double RepeatedImages::logOddsOfOld() const {
-  if (!have_noise_) return 0.0;
-  return *have_noise_ ? kCertain : kUnsuspected;
+double RepeatedImages::logOddsOfOld(double noise) const {
+  if (have_noise_) return *have_noise_ ? kCertain : kUnsuspected;
+  // The noise that noiseOf() finds is log-normal, with medians of 0.6 in images without noise (four rendered drives, by
+  // their texture) and of 1.8 in those of cameras (eight recorded ones), and a standard deviation of a third.
+  constexpr double kWithout = 0.6, kWith = 1.8, kSpread = 1.0 / 3.0;
+  const double middle = std::sqrt(kWithout * kWith);
+  return std::clamp(std::log(kWith / kWithout) / (kSpread * kSpread) * std::log(noise / middle), 0.0, kCertain);
 }
 
 /// Whether each feature has exactly the position of a feature of the previous pair.
@@ -80,9 +84,10 @@ std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, dou
   int best = 0, border = 0;
   bool is_above = false;  // the repeated part is above the border
   for (int k = 0; k <= count; ++k) {
-    const int below = k - old[k] + all_old - old[k], above = count - below;
-    if (std::max(below, above) <= best) continue;
-    best = std::max(below, above), border = k, is_above = above > below;
+    // Features that have the right label if the repeated part is below the border, or above it.
+    const int if_below = k - old[k] + all_old - old[k], if_above = count - if_below;
+    if (std::max(if_below, if_above) <= best) continue;
+    best = std::max(if_below, if_above), border = k, is_above = if_above > if_below;
   }
   // Given a border, labels (repeated or new) need fewer nats. The best of count + 1 random borders must save less.
   const double saved = entropyOf(all_old, count) - entropyOf(count - best, count);
@@ -98,12 +103,15 @@ std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, dou
   return indices;
 }
 
-void RepeatedImages::remember(const StereoFeatures& features, bool stood) {
+void RepeatedImages::remember(const StereoFeatures& features, std::optional<bool> stood) {
   constexpr int kStill = 4;  // pairs (chosen): a slow start looks like standstill for two
   const bool repeats = repeat(features);
   if (!repeats) single_ = in_a_row_ == 1 ? single_ + 1 : 0;
   in_a_row_ = repeats ? in_a_row_ + 1 : 0;
-  still_ = stood && !repeats ? still_ + 1 : 0;
+  // Images repeated while the camera stood, and a confirmed motion follows: they have no noise.
+  if (!repeats && stood.has_value() && still_repeats_ >= kStill) have_noise_ = false;
+  still_ = stood.value_or(false) && !repeats ? still_ + 1 : 0;
+  still_repeats_ = stood.value_or(false) && repeats ? still_repeats_ + 1 : 0;
   if (still_ >= kStill) {
     // A mover changes the pair, but without noise most features keep their exact positions.
     const std::vector<bool> repeated = this->repeated(features);

@@ -32,12 +32,13 @@ class RepeatedImages {
   bool comeTwice() const { return in_a_row_ == 0 && single_ >= 2; }
 
   /// Log-odds that repeated images are old ones, before the motion is considered. Images with noise repeat by a fault
-  /// only, a simulator's without noise whenever the camera stands. Both are equally likely until the camera has stood
-  /// for some pairs.
-  double logOddsOfOld() const;
+  /// only, a simulator's without noise whenever the camera stands. Which they are is known once the camera has stood for
+  /// some pairs; until then their noise tells, grey levels. Compression hides it, so little noise says nothing.
+  double logOddsOfOld(double noise) const;
 
-  /// Stores a pair. `stood`: its motion since the previous pair is confirmed and not significant.
-  void remember(const StereoFeatures& features, bool stood);
+  /// Stores a pair. `stood`: whether its motion since the previous pair is not significant; none if no motion is
+  /// confirmed.
+  void remember(const StereoFeatures& features, std::optional<bool> stood);
 
  private:
   std::vector<bool> repeated(const StereoFeatures& features) const;
@@ -46,6 +47,7 @@ class RepeatedImages {
   int in_a_row_ = 0;                            ///< see inARow()
   int single_ = 0;                              ///< successive single repetitions, see comeTwice()
   int still_ = 0;                               ///< successive pairs that stood and differ from the previous one
+  int still_repeats_ = 0;                       ///< successive pairs that stood and repeat the previous one
   std::optional<bool> have_noise_;              ///< none until the camera has stood
 };
 

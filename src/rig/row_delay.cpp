@@ -132,8 +132,8 @@ std::optional<RowDelay::Estimate> RowDelay::estimate() const {
   const Fit fit = this->fit(parts_);
   const Eigen::Matrix2d inverse = fit.information.inverse();
   // The spread of few blocks is uncertain: Student's distribution, by Wallace's bound of its quantiles.
-  const double few = freedom / kSquare * std::expm1(kSquare / freedom);
-  const Estimate estimate{fit.value[0], std::sqrt(few * (inverse * gradient_squares_ * inverse.transpose())(0, 0))};
+  const double student = freedom / kSquare * std::expm1(kSquare / freedom);
+  const Estimate estimate{fit.value[0], std::sqrt(student * (inverse * gradient_squares_ * inverse.transpose())(0, 0))};
   if (!(estimate.sigma < kFail)) return std::nullopt;
   return estimate;
 }

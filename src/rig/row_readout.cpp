@@ -130,8 +130,7 @@ void RowReadout::measure() {
 }
 
 std::optional<RowReadout::Estimate> RowReadout::estimate() const {
-  // The readout itself biases the measured rates: drives that follow hand_held 921 and 922 err by 0 to 6 % at 10 and
-  // 25 ms.
+  // The readout itself biases the measured rates: rendered hand-held drives err by 0 to 6 % at 10 and 25 ms.
   constexpr double kModel = 0.05;  // ratio of the value
   if (!(information_ > 0.0)) return std::nullopt;
   const double value = product_ / information_;

@@ -72,6 +72,21 @@ TEST(LocalMap, APairThatSharesHardlyAnythingWithTheOthersIsNotAdjusted) {
   EXPECT_FALSE(isAdjusted(5, 2)) << "it may turn about two points";
 }
 
+/// Even once the pair that began its points has left the map.
+TEST(LocalMap, DoubtfulPairsConfirmNoPoint) {
+  SyntheticScene scene(3, 3000, 120.0);
+  const auto confirmed = [&](bool doubtful) {
+    LocalMap map{LocalMapOptions()};
+    for (int id = 1; id <= 6; ++id) {
+      see(map, scene.view(kOrigin, id), id, kOrigin);
+      if (doubtful && id > 1) map.discountNewest();
+    }
+    return map.points(2).count();
+  };
+  EXPECT_GT(confirmed(false), 100);
+  EXPECT_EQ(confirmed(true), 0);
+}
+
 TEST(LocalMapKeyframes, GoByAgeWhenNoneLasts) {
   LocalMapOptions options;
   options.lasting_points = 10000;

@@ -784,6 +784,18 @@ TEST(VisualOdometry, ImagesWithNoiseThatRepeatAreFrozenHoweverSlowTheCameraIs) {
   }
 }
 
+/// No camera whose images have noise can give an image twice.
+TEST(VisualOdometry, ImagesThatShowTheirNoiseAreFrozenFromTheFirstOneOn) {
+  VisualOdometry odometry({});
+  const auto noisyPair = [&](int i, int pose) {
+    StereoFeatures pair = pairAt(slowPose(pose), i, street());
+    pair.report.noise = 2.0;
+    return pair;
+  };
+  for (int i = 0; i <= 8; ++i) expectState(odometry.update(noisyPair(i, i)), TrackingState::kTracking);
+  for (int i = 9; i <= 14; ++i) expectState(odometry.update(noisyPair(i, 8)), TrackingState::kDegraded);
+}
+
 TEST(VisualOdometry, AStopAtOnceIsDoubtfulForAPairAndBelievedAfterIt) {
   VisualOdometry odometry({});
   /// At one pose after the other, from pair i on.

@@ -45,6 +45,22 @@ TEST(LearntRig, ARotationOfOnePairIsTakenBack) {
   EXPECT_LT(shown(rig, turned).log_odds, 0.0) << "what came back is what this rig does";
 }
 
+/// The right image was of another moment: the rig is as before, whatever follows.
+TEST(LearntRig, ARotationBeforeAnOutageIsTakenBack) {
+  const StereoFeatures before = gridSeenWith(Eigen::Vector3d::Zero()), turned = gridSeenWith({0.0, 0.0, 6e-3});
+  const MeasuredPair measured{turned, 0.1, Eigen::Isometry3d::Identity(), 0.1, {}};
+  for (const bool goes_on : {true, false}) {
+    LearntRig rig = steady(before);
+    const RotationHypothesis rotation = shown(rig, turned);
+    rig.rotate(rotation, before.camera);
+    rig.learn(turned, &measured, {}, rotation, false);
+    rig.learn(turned, goes_on ? &measured : nullptr, {}, {}, false);
+    rig.learn(turned, nullptr, {}, {}, false);
+    EXPECT_EQ(rig.rotation.isZero(), !goes_on);
+    EXPECT_EQ(rig.rotation_covariance.isZero(), !goes_on);
+  }
+}
+
 TEST(LearntRig, AFewFeaturesShowNoRotation) {
   const LearntRig rig = steady(gridSeenWith(Eigen::Vector3d::Zero()));
   StereoFeatures wrong = synthetic::noFeatures(synthetic::camera());

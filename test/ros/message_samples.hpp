@@ -59,6 +59,7 @@ inline StereoFeatures someFeatures(ElementType type = ElementType::kBits,
   features.report.mean_intensity[1] = 99.25;
   features.report.sharpness[0] = 3.5;
   features.report.sharpness[1] = 2.75;
+  features.report.noise = 1.5;
   features.report.detect_time = 0.5;
   features.report.stereo_time = 0.25;
   features.report.describe_time = 0.125;

@@ -22,6 +22,7 @@ void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
     EXPECT_EQ(a.report.mean_intensity[side], b.report.mean_intensity[side]);
     EXPECT_EQ(a.report.sharpness[side], b.report.sharpness[side]);
   }
+  EXPECT_EQ(a.report.noise, b.report.noise);
   EXPECT_EQ(a.report.detect_time, b.report.detect_time);
   EXPECT_EQ(a.report.stereo_time, b.report.stereo_time);
   EXPECT_EQ(a.report.describe_time, b.report.describe_time);

@@ -30,6 +30,7 @@ struct ExtractionReport {
   int stereo_matched = 0;                 ///< of these, found in the right image
   double mean_intensity[2] = {0.0, 0.0};  ///< left and right, grey levels 0…255
   double sharpness[2] = {0.0, 0.0};       ///< left and right, mean absolute horizontal gradient, grey levels per px
+  double noise = 0.0;                     ///< left, standard deviation, grey levels; fine texture adds to it
   double detect_time = 0.0;               ///< s
   double stereo_time = 0.0;               ///< s
   double describe_time = 0.0;             ///< s
