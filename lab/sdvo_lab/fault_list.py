@@ -13,6 +13,7 @@ cv2.setNumThreads(1)
 # Pairs that a fault touches, out of every so many, and those after it without which there is none.
 FIRST, LAST, EVERY, AFTER = 30, 45, 80, 15
 PERIOD = 0.1  # s
+BRAKING = 8.0  # m/s^2, of a car on a dry road
 
 
 @dataclasses.dataclass
@@ -289,11 +290,19 @@ def black(count):
 
 
 def paused_in_the_dark(count):
-    """The drive stops for so many black pairs."""
+    """The drive brakes in the dark, stands for so many black pairs, and goes on as it braked."""
     def fault(pairs, drive, random):
-        last = pairs[FIRST - 1]
-        dark = [dataclasses.replace(blackened(last), stamp=last.stamp + k * PERIOD) for k in range(1, count + 1)]
-        return pairs[:FIRST] + dark + [dataclasses.replace(pair, stamp=pair.stamp + count * PERIOD) for pair in pairs[FIRST:]]
+        before, now = (drive.poses[pairs[i].truth][:3, 3] for i in (FIRST - 1, FIRST))
+        step = numpy.linalg.norm(now - before)
+        speed = step / PERIOD
+        ways = numpy.arange(0.0, speed * speed / (2 * BRAKING), step) if step > 0 else numpy.zeros(1)
+        braked = len(ways) - 1  # whole steps until it stands
+        slow = numpy.diff((speed - numpy.sqrt(speed * speed - 2 * BRAKING * ways)) / BRAKING)
+        rest = len(pairs) - FIRST - 2 * braked
+        stamps = pairs[FIRST - 1].stamp + numpy.cumsum([*slow, *[PERIOD] * count, *slow[::-1], *[PERIOD] * rest])
+        dark = [blackened(pair) for pair in pairs[FIRST:FIRST + braked] + [pairs[FIRST + braked - 1]] * count]
+        return pairs[:FIRST] + [dataclasses.replace(pair, stamp=float(stamp))
+                                for pair, stamp in zip(dark + pairs[FIRST + braked:], stamps)]
     return fault
 
 
