@@ -45,19 +45,26 @@ TEST(LearntRig, ARotationOfOnePairIsTakenBack) {
   EXPECT_LT(shown(rig, turned).log_odds, 0.0) << "what came back is what this rig does";
 }
 
-/// The right image was of another moment: the rig is as before, whatever follows.
-TEST(LearntRig, ARotationBeforeAnOutageIsTakenBack) {
+/// The right image was of another moment: the rig is as before, whatever follows. A dark pair says nothing of it.
+TEST(LearntRig, ARotationWhoseNextPairAgreesOnNoMotionIsTakenBack) {
   const StereoFeatures before = gridSeenWith(Eigen::Vector3d::Zero()), turned = gridSeenWith({0.0, 0.0, 6e-3});
   const MeasuredPair measured{turned, 0.1, Eigen::Isometry3d::Identity(), 0.1, {}};
-  for (const bool goes_on : {true, false}) {
+  MotionHypothesis disagreeing, dark;
+  disagreeing.agreement.matches = 100;
+  struct Case {
+    const MeasuredPair* next;
+    const MotionHypothesis& found;
+    bool is_taken_back;
+  };
+  for (const Case& c : {Case{&measured, disagreeing, false}, {nullptr, disagreeing, true}, {nullptr, dark, false}}) {
     LearntRig rig = steady(before);
     const RotationHypothesis rotation = shown(rig, turned);
     rig.rotate(rotation, before.camera);
     rig.learn(turned, &measured, {}, rotation, false);
-    rig.learn(turned, goes_on ? &measured : nullptr, {}, {}, false);
-    rig.learn(turned, nullptr, {}, {}, false);
-    EXPECT_EQ(rig.rotation.isZero(), !goes_on);
-    EXPECT_EQ(rig.rotation_covariance.isZero(), !goes_on);
+    rig.learn(turned, c.next, c.found, {}, false);
+    rig.learn(turned, nullptr, disagreeing, {}, false);
+    EXPECT_EQ(rig.rotation.isZero(), c.is_taken_back);
+    EXPECT_EQ(rig.rotation_covariance.isZero(), c.is_taken_back);
   }
 }
 
