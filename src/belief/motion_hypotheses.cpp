@@ -77,7 +77,7 @@ bool isObject(const Points& points, const Points& others) {
 }
 
 /// Whether a row of the image separates points from others, as in a torn or damaged image. Their numbers do not imply
-/// which part shows the camera's motion.
+/// which part shows the camera's motion. Points in random order are rarely divided so.
 bool areDivided(const Points& points, const Points& others) {
   constexpr double kWrongInliers = 0.1;  // of either side (chosen): some wrong matches agree by chance
   const auto rowsOf = [](const Points& pixels) {

@@ -60,8 +60,8 @@ class PoseCovariance {
   /// its covariance in the map exceeds the key frame's. Returns the covariance of the motion between the two reported
   /// poses. After a key frame, this is `since_keyframe`. Otherwise both poses have their own noise, A and B, and share
   /// the key frame's noise K, which cancels in the motion. All saw the points equally often, so K is as large as the
-  /// smaller own noise, A. Hence A + B = K + B, the larger covariance since the key frame. Predictions and doubts of
-  /// the previous pose are added.
+  /// smaller own noise, A. The motion's A + B is then K + B, which is the larger covariance since the key frame.
+  /// Predictions and doubts of the previous pose are added.
   Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
   /// The same in a map of one key frame.
   Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {

@@ -239,7 +239,7 @@ void PairSearch::findRotated() {
     const RotationHypothesis at_first = rotation_;
     const int inliers = found_.agreement.inliers;
     const Eigen::Vector3d yaw = yawByDisparities(given_.camera, found_.correspondences, *scene_->T_current_reference);
-    compensateFor({yaw, Eigen::Matrix3d::Zero(), kCertain, kUnsuspected});
+    compensateFor({yaw, Eigen::Matrix3d::Zero(), kCertain, kUnsuspected});  // as if certain, for a trial
     rotation_ = rotationBeyond(yaw);
     if (!found_.motion.success || found_.agreement.inliers <= inliers || !(rotation_.log_odds > 0.0))
       compensateFor(at_first), findGlobal();

@@ -69,6 +69,7 @@ class PairSearch {
 
  private:
   const StereoFeatures& part() const { return new_part_ ? *new_part_ : whole(); }
+  /// Both sides at the left image's moment, if a delay is known.
   const StereoFeatures& inStep() const { return synchronised_ ? *synchronised_ : taken(); }
 
   void take(const StereoCamera& lens);

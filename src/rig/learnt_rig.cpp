@@ -78,6 +78,7 @@ RotationHypothesis LearntRig::rotationHypothesis(const StereoFeatures& features,
   };
   const double knock = kUnsuspected + log_factor(kKnock * kKnock * Eigen::Matrix3d::Identity());
   const double other_moment = log_prior_of_other_moment_ + log_factor(turns);
+  // Each against the other one and against neither.
   hypothesis.log_odds = knock - logOnePlus(other_moment);
   if (!compensated.isZero()) hypothesis.log_odds = std::min(hypothesis.log_odds, logRatioOfRows(by_rows, compensated));
   hypothesis.log_odds_of_other_moment = other_moment - logOnePlus(knock);

@@ -88,6 +88,7 @@ constexpr double kLeastTurning = 2.0;  // px/s: more than errors of measured rot
 }  // namespace
 
 double logRatioOfDelay(const std::vector<RowMotion>& rows, double delay, double row_error) {
+  // A right image of an earlier moment looks like the left image's error, which a synchronous rig's rows have, too.
   std::bitset<RowDelay::kParts> seen;
   for (const RowMotion& row : rows) seen.set(static_cast<std::size_t>(row.part));
   const double parts = static_cast<double>(seen.count()) - 1.0;  // one fixes the constant
