@@ -45,7 +45,8 @@ struct RigEstimate {
   double delay() const { return mean[kDelay]; }
 
   /// Derivative of the rig by a rotation of the right camera, rad about the axes of its optical frame. The one about x
-  /// is left out: it changes disparities by f * x * y, and to estimate it improved no rendered rig (0.05 and 0.2 degrees).
+  /// is left out: it changes disparities by f * x * y, and to estimate it improved no rendered rig (0.05 and 0.2
+  /// degrees).
   static Eigen::Matrix<double, kParameters, 3> byRotation(const StereoCamera& camera) {
     Eigen::Matrix<double, kParameters, 3> by_rotation = Eigen::Matrix<double, kParameters, 3>::Zero();
     by_rotation(0, 1) = by_rotation(1, 1) = camera.fx;

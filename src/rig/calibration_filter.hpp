@@ -27,8 +27,8 @@ class CalibrationFilter {
 
   /// Calibration before a window's adjustment: estimate(), which knows what the same window showed up to its last pair.
   /// While one key frame stays, a prior without that would remain as wide as in the beginning, and the window would
-  /// follow noise. The mean excludes the effect of delay(), for which disparities are compensated already. `shape`: derivative of the
-  /// calibration by the rig.
+  /// follow noise. The mean excludes the effect of delay(), for which disparities are compensated already. `shape`:
+  /// derivative of the calibration by the rig.
   CalibrationBelief prior(const RigEstimate::Shape& shape) const;
 
   /// Adds the window from pair `oldest_id` to `newest_id`. `calibration` includes the window's prior(), `information`

@@ -62,15 +62,15 @@ struct LearntRig {
   RigEstimate::Matrix rotate(const RotationHypothesis& new_rotation, const StereoCamera& camera);
 
   /// Learns from a pair. A rotation is taken back if the next pair's matches agree on no motion: its images were wrong,
-  /// not the rig. Refused pairs raise the odds of right images of other moments, unconfirmed ones interrupt the pairs of
-  /// delay and readout. `measured` is null without a motion.
+  /// not the rig. Refused pairs raise the odds of right images of other moments, unconfirmed ones interrupt the pairs
+  /// of delay and readout. `measured` is null without a motion.
   void learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
              const RotationHypothesis& new_rotation, bool is_confirmed);
 
  private:
   NoiseOptions assumed_;
-  /// Log-odds of a right image of another moment, before its rotation is considered. They are those of a knock at a pair
-  /// that the rig monitor refused. Each pair after it halves the odds.
+  /// Log-odds of a right image of another moment, before its rotation is considered. They are those of a knock at a
+  /// pair that the rig monitor refused. Each pair after it halves the odds.
   double log_prior_of_other_moment_ = -std::numeric_limits<double>::infinity();
   double delay_sigma_;                                         ///< s: standard deviation of the delay of one pair
   Eigen::Matrix3d rotation_noise_ = Eigen::Matrix3d::Zero();   ///< rad^2: second moment of confirmed pairs' rotations

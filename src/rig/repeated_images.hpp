@@ -32,8 +32,8 @@ class RepeatedImages {
   bool comeTwice() const { return in_a_row_ == 0 && single_ >= 2; }
 
   /// Log-odds that repeated images are old ones, before the motion is considered. Images with noise repeat by a fault
-  /// only, a simulator's without noise whenever the camera stands. Which they are is known once the camera has stood for
-  /// some pairs; until then their noise tells, grey levels. Compression hides it, so little noise says nothing.
+  /// only, a simulator's without noise whenever the camera stands. Which they are is known once the camera has stood
+  /// for some pairs; until then their noise tells, grey levels. Compression hides it, so little noise says nothing.
   double logOddsOfOld(double noise) const;
 
   /// Stores a pair. `stood`: whether its motion since the previous pair is not significant; none if no motion is

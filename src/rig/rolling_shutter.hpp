@@ -59,8 +59,8 @@ class RollingShutter {
   /// The features as a global shutter would have seen them at the stamp.
   static StereoFeatures asGlobal(const RolledPair& pair);
 
-  /// Whether a difference between two velocities moves no row by more than a part of its noise. Only the rotations count:
-  /// translations move far points less.
+  /// Whether a difference between two velocities moves no row by more than a part of its noise. Only the rotations
+  /// count: translations move far points less.
   bool isNegligible(const StereoCamera& camera, const Vector6d& difference) const;
 
   /// Rate by the inliers of the motion that was found with asGlobal(`pair`). None if they do not constrain it.

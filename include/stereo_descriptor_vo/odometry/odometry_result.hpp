@@ -59,8 +59,8 @@ struct OdometryResult {
   double disparity_bend_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
   double right_delay = std::numeric_limits<double>::quiet_NaN();           ///< right images are later, s; compensated
   double right_delay_sigma = std::numeric_limits<double>::quiet_NaN();     ///< s
-  double readout = std::numeric_limits<double>::quiet_NaN();  ///< of both shutters, first row to last, s
-  double readout_sigma = std::numeric_limits<double>::quiet_NaN();  ///< s
+  double readout = std::numeric_limits<double>::quiet_NaN();               ///< of both shutters, first row to last, s
+  double readout_sigma = std::numeric_limits<double>::quiet_NaN();         ///< s
   double used_readout = 0.0;  ///< by which rows are moved to the stamp, s; 0: they are not
   Eigen::Vector3d right_rotation = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());        ///< rad
   Eigen::Vector3d right_rotation_sigma = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< rad
