@@ -44,8 +44,7 @@ class Lineariser {
 
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
                              const std::vector<Correspondence>& correspondences, Eigen::Isometry3d& T) {
-  constexpr double kSmallestGain =
-      1e-5;  // of the cost: a smaller step is below a tenth of the result's standard deviation
+  constexpr double kSmallestGain = 1e-5;  // of the cost: such a step is a tenth of the result's standard deviation
   double damping = 1e-6;
   Lineariser problem(camera, options, correspondences);
   NormalEquations equations = problem.at(T);
