@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstring>
 #include <fstream>
 #include <thread>
 
@@ -74,7 +75,10 @@ TEST_F(PlacesFile, WhatIsSavedIsLoaded) {
   EXPECT_EQ(loaded.stream.frame_id, "left_optical");
 }
 
+/// They end where right_delay and noise are now.
 TEST_F(PlacesFile, PlacesOfTheFirstVersionAreLoaded) {
+  const float added[] = {0.25f, 2.f};
+  for (Place& place : places_) place.features.right_delay = added[0], place.features.report.noise = added[1];
   save(path_);
   const std::string old = path_ + ".old";
   rosbag::Bag now(path_), before(old, rosbag::bagmode::Write);
@@ -83,10 +87,14 @@ TEST_F(PlacesFile, PlacesOfTheFirstVersionAreLoaded) {
     ros::serialization::OStream out(bytes.data(), message.size());
     message.write(out);
     const bool is_place = message.getTopic() == "place";
+    if (is_place) {
+      EXPECT_EQ(std::memcmp(bytes.data() + bytes.size() - sizeof added, added, sizeof added), 0);
+    }
     topic_tools::ShapeShifter shifter;
     shifter.morph(is_place ? "d90a2505b9172820b06c0867769c61b0" : message.getMD5Sum(), message.getDataType(),
                   message.getMessageDefinition(), "");
-    ros::serialization::IStream in(bytes.data(), message.size() - (is_place ? 4 : 0));
+    ros::serialization::IStream in(bytes.data(),
+                                   message.size() - static_cast<std::uint32_t>(is_place ? sizeof added : 0));
     shifter.read(in);
     before.write(message.getTopic(), message.getTime(), shifter);
   }

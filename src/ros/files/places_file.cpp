@@ -109,7 +109,7 @@ namespace msgs = stereo_descriptor_vo;
 
 constexpr const char* kPlaceTopic = "place";
 constexpr const char* kGraphTopic = "map_graph";
-constexpr const char* kOldPlace = "d90a2505b9172820b06c0867769c61b0";  // MD5 in 0.1.0, without right_delay at the end
+constexpr const char* kOldPlace = "d90a2505b9172820b06c0867769c61b0";  // MD5 in 0.1.0
 
 /// Refuses an array longer than the rest of its message. ROS' own stream allocates it before it checks.
 struct CheckedStream : ros::serialization::Stream {
@@ -186,7 +186,7 @@ SavedPlaces read(const std::string& path) {
     if (topic == kPlaceTopic) {
       std::string completed;
       if (message.connection.md5sum == kOldPlace) {
-        completed.assign(message.data).append(sizeof(float), '\0');
+        completed.assign(message.data).append(2 * sizeof(float), '\0');  // right_delay and noise
         message.connection.md5sum = ros::message_traits::md5sum<msgs::Place>();
         message.data = completed;
       }
