@@ -54,7 +54,8 @@ void Doubt::raise(const std::vector<Evidence>& evidence) {
 }
 
 void Doubt::fade(double seconds) {
-  // Chosen: with 0.2 s a mover over most of the view is believed, from 0.3 s on healthy cars at 5 Hz are doubted.
+  // s (chosen by lab/run faults and healthy cars at 5 Hz): with 0.2 s a mover over most of the view is believed, from
+  // 0.3 s on the cars are doubted.
   constexpr double kHalfLife = 0.25;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-seconds / kHalfLife);
   if (!lasts()) distance_ = angle_ = largest_ = 0.0;

@@ -77,7 +77,7 @@ bool isObject(const Points& points, const Points& others) {
 }
 
 /// Whether a row of the image separates points from others, as in a torn or damaged image. Their numbers do not imply
-/// which part shows the camera's motion. Points in random order are rarely divided so.
+/// which part shows the camera's motion. Chance divides points so with kTailProbability at most.
 bool areDivided(const Points& points, const Points& others) {
   constexpr double kWrongInliers = 0.1;  // of either side (chosen): some wrong matches agree by chance
   const auto rowsOf = [](const Points& pixels) {
@@ -276,7 +276,7 @@ PlaceBelief choosePlace(const FoundPlace& place, const std::vector<ExpectedMotio
   if (place.alike)
     belief.mixture.add({logWeight(other) - logWeight(chosen), momentOf(logSE3(chosen * other.inverse())),
                         "other places of the map look alike"});
-  // The map matches by chance, and the camera moved as the prior says.
+  // Or the map matched by chance, and the camera moved as one of the priors says.
   for (const ExpectedMotion& expected : prior)
     belief.mixture.add({std::log(kTailProbability * place.chance) - logWeight(chosen),
                         momentOf(expected.innovation(chosen.inverse())) + expected.covariance,

@@ -47,11 +47,11 @@ PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options)
 PlaceRecognition::PlaceRecognition(PlaceRecognition&&) noexcept = default;
 PlaceRecognition::~PlaceRecognition() = default;
 
-std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& taken, const CameraMotion& motion) {
-  taken.check();
-  if (!places_.empty() && taken.count() > 0 && taken.kind() != places_.begin()->second.features.kind())
+std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& features, const CameraMotion& motion) {
+  features.check();
+  if (!places_.empty() && features.count() > 0 && features.kind() != places_.begin()->second.features.kind())
     throw std::invalid_argument("the places are described by " + toString(places_.begin()->second.features.kind()) +
-                                ", not by " + toString(taken.kind()));
+                                ", not by " + toString(features.kind()));
   // The path since the last key frame.
   if (way_.T_odom_camera) {
     const Eigen::Isometry3d T_previous_current = way_.T_odom_camera->inverse() * motion.T_odom_camera;
@@ -63,12 +63,13 @@ std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& taken
   }
   way_.known &= motion.continuous;
   way_.T_odom_camera = motion.T_odom_camera;
-  if (!isKeyframe(taken)) return std::nullopt;
+  if (!isKeyframe(features)) return std::nullopt;
 
   PlaceReport report;
   report.id = next_id_;
   Stopwatch stopwatch;
-  const StereoFeatures kept = thinOut(motion.readout != 0.0 ? atStamp(taken, motion) : taken, options_.max_features);
+  const StereoFeatures kept =
+      thinOut(motion.readout != 0.0 ? atStamp(features, motion) : features, options_.max_features);
   const PlaceSignature signature = tools_->index.signature(kept);
   addKeyframe(kept, next_id_++);
   const Place& here = places_.at(report.id);

@@ -78,7 +78,7 @@ RotationHypothesis LearntRig::rotationHypothesis(const StereoFeatures& features,
   };
   const double knock = kUnsuspected + log_factor(kKnock * kKnock * Eigen::Matrix3d::Identity());
   const double other_moment = log_prior_of_other_moment_ + log_factor(turns);
-  // Each against the other one and against neither.
+  // The odds of each cause are against the other one and no change.
   hypothesis.log_odds = knock - logOnePlus(other_moment);
   if (!compensated.isZero()) hypothesis.log_odds = std::min(hypothesis.log_odds, logRatioOfRows(by_rows, compensated));
   hypothesis.log_odds_of_other_moment = other_moment - logOnePlus(knock);
@@ -92,6 +92,7 @@ RigEstimate::Matrix LearntRig::rotate(const RotationHypothesis& new_rotation, co
   if (back.dot((covariance + rotation_covariance).inverse() * back) < noiseGate(3)) {
     // The rig is again as before the last rotation: an error of images, no knock.
     rotation_noise_ += new_rotation.value * new_rotation.value.transpose();
+    rotated_last_ = false;
     return RigEstimate::Matrix::Zero();
   }
   rotation = now, rotation_covariance = covariance;

@@ -43,8 +43,8 @@ bool RepeatedImages::shouldHaveMoved(const StereoFeatures& features, double nois
 
 double RepeatedImages::logOddsOfOld(double noise) const {
   if (have_noise_) return *have_noise_ ? kCertain : kUnsuspected;
-  // The noise that noiseOf() finds is log-normal, with medians of 0.6 in images without noise (four rendered drives, by
-  // their texture) and of 1.8 in those of cameras (eight recorded ones), and a standard deviation of a third.
+  // The noise that noiseOf() finds, grey levels, is about log-normal: medians of 0.6 in images without noise (four
+  // rendered drives, by their texture) and of 1.8 in those of cameras (six recorded drives), spread by a third.
   constexpr double kWithout = 0.6, kWith = 1.8, kSpread = 1.0 / 3.0;
   const double middle = std::sqrt(kWithout * kWith);
   return std::clamp(std::log(kWith / kWithout) / (kSpread * kSpread) * std::log(noise / middle), 0.0, kCertain);

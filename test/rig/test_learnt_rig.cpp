@@ -43,6 +43,11 @@ TEST(LearntRig, ARotationOfOnePairIsTakenBack) {
   rig.rotate(back, before.camera);
   EXPECT_TRUE(rig.rotation.isZero() && rig.rotation_covariance.isZero());
   EXPECT_LT(shown(rig, turned).log_odds, 0.0) << "what came back is what this rig does";
+  MotionHypothesis disagreeing;
+  disagreeing.agreement.matches = 100;
+  rig.learn(before, nullptr, disagreeing, back, false);
+  rig.learn(before, nullptr, disagreeing, {}, false);
+  EXPECT_TRUE(rig.rotation.isZero()) << "it does not come again";
 }
 
 /// The right image was of another moment: the rig is as before, whatever follows. A dark pair says nothing of it.

@@ -30,13 +30,13 @@ struct ExtractionReport {
   int stereo_matched = 0;                 ///< of these, found in the right image
   double mean_intensity[2] = {0.0, 0.0};  ///< left and right, grey levels 0…255
   double sharpness[2] = {0.0, 0.0};       ///< left and right, mean absolute horizontal gradient, grey levels per px
-  double noise = 0.0;                     ///< left, standard deviation, grey levels; fine texture adds to it
-  double detect_time = 0.0;               ///< s
-  double stereo_time = 0.0;               ///< s
-  double describe_time = 0.0;             ///< s
-  bool refused = false;                   ///< by the rig monitor: rows do not agree, `status` names the cause
-  bool along_rows = false;                ///< the right camera turned: matched along the rows that the monitor found
-  std::string status;                     ///< empty, or why the pair gave few or no features
+  double noise = 0.0;          ///< left, standard deviation, grey levels; fine texture adds to it; 0: not measured
+  double detect_time = 0.0;    ///< s
+  double stereo_time = 0.0;    ///< s
+  double describe_time = 0.0;  ///< s
+  bool refused = false;        ///< by the rig monitor: rows do not agree, `status` names the cause
+  bool along_rows = false;     ///< the right camera turned: matched along the rows that the monitor found
+  std::string status;          ///< empty, or why the pair gave few or no features
 };
 
 /// One row of StereoFeatures without its descriptor and its patch; meaning and units as there.

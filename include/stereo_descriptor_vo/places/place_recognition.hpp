@@ -71,7 +71,7 @@ class PlaceRecognition {
   /// that takes long and may be done on a copy meanwhile (graph(), PoseGraph::optimise(), adopt()). Throws
   /// std::invalid_argument, and adds no place, for descriptors that are not binary or of another kind than those
   /// before. The caller ensures that the camera is the same.
-  std::optional<PlaceReport> observe(const StereoFeatures& taken, const CameraMotion& motion);
+  std::optional<PlaceReport> observe(const StereoFeatures& features, const CameraMotion& motion);
 
   const PoseGraph& graph() const { return graph_; }
   bool adopt(const PoseGraph& optimised) { return graph_.adopt(optimised); }
