@@ -14,8 +14,8 @@ import yaml
 
 BLOCKS = ('stereo_features', 'visual_odometry', 'place_recognition', 'features_image')
 # Options that users look for among the arguments.
-OPTIONS = ('stereo_features/detector/mask', 'stereo_features/detector/max_features', 'stereo_features/find_camera', 'stereo_features/max_rate',
-           'visual_odometry/initial_pose', 'visual_odometry/planar', 'visual_odometry/publish_null_when_lost',
+OPTIONS = ('stereo_features/detector/mask', 'stereo_features/detector/max_features', 'stereo_features/find_camera', 'stereo_features/max_rate', 'stereo_features/sync_tolerance',
+           'visual_odometry/initial_pose', 'visual_odometry/publish_null_when_lost',
            'place_recognition/robot_name', 'place_recognition/save_at_shutdown')
 LARGEST = 1000000  # bytes, of options
 LONGEST = 60  # s that a launch takes to read the copy

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "../common/text.hpp"
 
@@ -60,19 +61,27 @@ double mosaicShare(const cv::Mat& image) {
   return all < kFewest ? 0.0 : static_cast<double>(chequered) / all;
 }
 
-void MosaicCheck::add(const cv::Mat& left, const cv::Mat& right) {
+cv::Mat withoutMosaic(const cv::Mat& image) {
+  cv::Mat smooth;
+  cv::GaussianBlur(image, smooth, {3, 3}, 0);  // weights of 1/4, 1/2 and 1/4
+  return smooth;
+}
+
+std::array<cv::Mat, 2> MosaicCheck::add(const cv::Mat& left, const cv::Mat& right) {
   constexpr int kEach = 10;  // pairs: it does not change
-  if (pairs_++ % kEach != 0) return;
-  left_ = mosaicShare(left);
-  right_ = mosaicShare(right);
+  if (pairs_++ % kEach == 0) {
+    left_ = mosaicShare(left);
+    right_ = mosaicShare(right);
+  }
+  return {left_ > kMosaicShare ? withoutMosaic(left) : left, right_ > kMosaicShare ? withoutMosaic(right) : right};
 }
 
 std::string MosaicCheck::problem() const {
   const bool is_left = left_ > kMosaicShare, is_right = right_ > kMosaicShare;
   if (!is_left && !is_right) return "";
   return std::string(is_left && is_right ? "both images are" : is_left ? "the left image is" : "the right image is") +
-         " a colour sensor's Bayer mosaic (a period of two pixels) under the name of a grey image: let the driver name "
-         "it (bayer_rggb8, …) and start stereo_raw.launch, which converts it";
+         " a colour sensor's Bayer mosaic (a period of two pixels) under the name of a grey image, smoothed, which costs "
+         "sharpness: let the driver name it (bayer_rggb8, …) and start stereo_raw.launch, which converts it";
 }
 
 Finding MosaicCheck::judge() const {

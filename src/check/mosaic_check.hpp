@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -11,11 +12,14 @@ namespace sdvo {
 /// also after it was rectified. No scene has it: lenses and pixels blur what is as fine.
 double mosaicShare(const cv::Mat& image);
 
+/// A copy of an image without that pattern: smoothed over three pixels, which leaves nothing of a period of two.
+cv::Mat withoutMosaic(const cv::Mat& image);
+
 /// Whether images are a colour sensor's mosaic under the name of grey ones.
 class MosaicCheck {
  public:
-  /// The next pair, CV_8UC1.
-  void add(const cv::Mat& left, const cv::Mat& right);
+  /// Looks at the next pair, CV_8UC1, and returns it without the pattern, where a side has it.
+  std::array<cv::Mat, 2> add(const cv::Mat& left, const cv::Mat& right);
 
   /// Fault in words, of the last pairs; empty: none.
   std::string problem() const;

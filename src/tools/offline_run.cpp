@@ -58,8 +58,8 @@ void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, 
   const ExtractionReport last = before            ? before->features.report
                                 : frames_.empty() ? ExtractionReport()
                                                   : frames_.back().extraction;
-  Extracted pair{extractor_.extract(camera, left, right, stamp, cv::Mat(), last), 0.0};
-  mosaic_.add(left, right);
+  const auto [grey_left, grey_right] = mosaic_.add(left, right);
+  Extracted pair{extractor_.extract(camera, grey_left, grey_right, stamp, cv::Mat(), last), 0.0};
   if (!mosaic().empty()) pair.features.report.status = mosaic();
   if (odometry.valid()) odometry.get();
   pair.features.right_delay = right_delay;

@@ -42,12 +42,19 @@ TEST(MosaicCheck, NamesTheSideThatHasThePattern) {
   const cv::Mat grey = scene();
   for (const cv::Mat& mosaic : {mosaicOf(grey, 0.5, 0.7), mosaicOf(grey, 1.0, 0.45), rectified(mosaicOf(grey, 0.5, 0.7))}) {
     MosaicCheck left, both;
-    left.add(mosaic, grey);
+    const auto [smooth, untouched] = left.add(mosaic, grey);
+    EXPECT_LT(mosaicShare(smooth), 0.02);
+    EXPECT_EQ(untouched.data, grey.data);
     both.add(mosaic, mosaic);
     expectWords(left.problem(), {"left image is", "Bayer", "stereo_raw.launch"});
     expectWords(both.problem(), {"both images"});
     EXPECT_EQ(both.judge().verdict, Verdict::kFail);
   }
+}
+
+TEST(MosaicCheck, NothingIsLeftOfThePattern) {
+  const cv::Mat smooth = withoutMosaic(mosaicOf(cv::Mat(16, 16, CV_8U, cv::Scalar(200)), 0.5, 0.7));
+  EXPECT_EQ(cv::norm(smooth, cv::Mat(16, 16, CV_8U, cv::Scalar(160)), cv::NORM_INF), 0.0);  // (0.5 + 1 + 1 + 0.7) / 4 of it
 }
 
 TEST(MosaicCheck, GreyImagesHaveNone) {

@@ -33,10 +33,10 @@ from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 # Under the nodelets' names; what an argument of the launch file can set.
 ARGUMENTS = {'odom_frame_id': 'visual_odometry/odom_frame_id', 'base_frame_id': 'visual_odometry/base_frame_id',
              'publish_tf': 'visual_odometry/publish_tf', 'use_imu': 'visual_odometry/use_imu', 'guess_frame_id': 'visual_odometry/guess_frame_id',
-             'approximate_sync': 'stereo_features/approximate_sync', 'sync_tolerance': 'stereo_features/sync_tolerance',
+             'planar': 'visual_odometry/planar', 'approximate_sync': 'stereo_features/approximate_sync',
              'image_transport': 'stereo_features/image_transport', 'queue_size': 'stereo_features/queue_size'}
 IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'publish_tf': False, 'use_imu': True, 'guess_frame_id': 'wheel_odom',
-           'approximate_sync': True, 'sync_tolerance': 0.002, 'image_transport': 'compressed', 'queue_size': 7}
+           'planar': True, 'approximate_sync': True, 'image_transport': 'compressed', 'queue_size': 7}
 
 
 FOLDER = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), 'launch')

@@ -189,22 +189,21 @@ class StereoFeaturesNodelet : public RobotNodelet {
     if (decoded.new_range && throttle_.allows("mono16"))
       NODELET_INFO_STREAM("mono16 images: " << decoder_.greyRange().black << " to " << decoder_.greyRange().white
                                             << " are black to white");
-    StereoFeatures features =
-        extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask_, last_report_);
+    const auto [left, right] = mosaic_.add(decoded.left, decoded.right);
+    StereoFeatures features = extractor_->extract(decoded.camera, left, right, nanoseconds(stamp), mask_, last_report_);
     last_report_ = features.report;
     if (options_.pairing.approximate_sync) features.right_delay = secondsBetween(stamp, pair.right_image->header.stamp);
     // After the extraction, which throws if the calibration does not fit the images: such a one begins no new stream.
     const std::string unrectified = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
     noteCamera(decoded.camera, pair.left_info->distortion_model, unrectified);
     if (emitter_.judge().verdict == Verdict::kOpen) {  // until the camera has moved enough
-      emitter_.add(decoded.left);
+      emitter_.add(left);
       warnOf("emitter", emitter_.judge());
     }
     if (features.report.refused && !unrectified.empty()) features.report.status = unrectified;
-    repeats_.add(decoded.left, decoded.right, nanoseconds(stamp));
+    repeats_.add(left, right, nanoseconds(stamp));
     if (!repeats_.problem().empty() && (features.report.refused || features.report.status.empty()))
       features.report.status = repeats_.problem();
-    mosaic_.add(decoded.left, decoded.right);
     if (const std::string problem = mosaic_.problem(); !problem.empty()) {
       if (!std::exchange(mosaic_found_, true)) warnOf("mosaic", mosaic_.judge());
       features.report.status = problem;
@@ -213,7 +212,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
     diagnostics_->note(features);
     reportRig(features, stamp);
     const auto message = boost::make_shared<stereo_descriptor_vo::StereoFeatures>(
-        ros_conversions::toMessage(features, extractor_->sizeCurve(decoded.left.size())));
+        ros_conversions::toMessage(features, extractor_->sizeCurve(left.size())));
     message->header.stamp = stamp;
     message->header.frame_id = ros_conversions::cleanFrameId(pair.left_image->header.frame_id);
     message->stream_epoch = stream_epoch_;
