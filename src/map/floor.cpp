@@ -69,7 +69,15 @@ Matrix6d Floor::constrained(const Eigen::Isometry3d& T_origin_camera, const Matr
   return 0.5 * (left + left.transpose());
 }
 
-std::string FloorBelief::note(const Floor& known, const Eigen::Isometry3d& T_camera_origin) {
+Matrix6d FloorBelief::covariance(const Floor& known, const Eigen::Isometry3d& T_origin_camera,
+                                 const Matrix6d& of_pose) const {
+  const Matrix6d with_floor = on_floor_ ? known.constrained(T_origin_camera, of_pose) : of_pose;
+  return with_floor + mount_.ofPose(known.T_base_camera, T_origin_camera, on_floor_ && height_ == 0.0);
+}
+
+std::string FloorBelief::note(const Floor& known, const Eigen::Isometry3d& T_camera_origin,
+                              const Eigen::Isometry3d& T_previous_current) {
+  mount_.add(known.T_base_camera, T_previous_current);
   constexpr int kLevel = 10;  // pairs that make another floor (chosen: a second at 10 Hz)
   const Eigen::Vector3d residual = known.residual(T_camera_origin);
   const double height = known.base(T_camera_origin).translation().z();

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "../motion/noise.hpp"
+#include "mount_tilt.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
@@ -53,15 +54,21 @@ struct Floor {
 /// Which floor a planar base is on: a ramp leads to another one.
 class FloorBelief {
  public:
-  double height() const { return height_; }  ///< m, in the axes of the base's first pose
-  bool isOnFloor() const { return on_floor_; }
+  explicit FloorBelief(const PlanarOptions& options) : mount_(options) {}
 
-  /// Updates the belief by a pose; `known` is the floor at height(). Returns words if the base is off the floor: by how
-  /// much, and whether its height is the floor from now on. Otherwise an empty string.
-  std::string note(const Floor& known, const Eigen::Isometry3d& T_camera_origin);
+  double height() const { return height_; }  ///< m, in the axes of the base's first pose
+
+  /// Updates the belief by a pose and the motion that led there; `known` is the floor at height(). Returns words if the
+  /// base is off the floor: by how much, and whether its height is the floor from now on. Otherwise an empty string.
+  std::string note(const Floor& known, const Eigen::Isometry3d& T_camera_origin,
+                   const Eigen::Isometry3d& T_previous_current);
+
+  /// Covariance of a pose, given without a floor, by what is believed of the floor and of the mount.
+  Matrix6d covariance(const Floor& known, const Eigen::Isometry3d& T_origin_camera, const Matrix6d& of_pose) const;
 
  private:
   double height_ = 0.0;
+  MountTilt mount_;
   bool on_floor_ = true;  ///< at the last pose
   int level_pairs_ = 0;   ///< consecutive ones, level and at another height
 };

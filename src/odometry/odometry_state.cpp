@@ -57,6 +57,7 @@ OdometryState::OdometryState(const VisualOdometryOptions& options, int first_epo
     : rig(unknownRig(options)),
       shutter(options.calibration.readout, options.tracking.rotation_acceleration),
       prior(options.tracking),
+      floor(options.planar),
       epoch(first_epoch) {}
 
 void OdometryState::forgetRig(const VisualOdometryOptions& options) {
@@ -145,8 +146,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
     result.has_pose = true;
     result.T_origin_camera = T_origin_camera;
     result.pose_covariance = covariance.value() + covariance.byRig(rig.calibration.estimate());
-    if (known_floor && floor.isOnFloor())
-      result.pose_covariance = known_floor->constrained(T_origin_camera, result.pose_covariance);
+    if (known_floor) result.pose_covariance = floor.covariance(*known_floor, T_origin_camera, result.pose_covariance);
   }
   if (step.T_previous_current && !step.changes_epoch) {
     result.has_motion = true;

@@ -365,7 +365,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::apply(const Outcome& outcome, c
     state_.prior.takeVelocity(pair.features().stamp, found.motion.T_current_reference.inverse(), outcome.since,
                               measured, doubt.empty(), step.covariance - measured);
   if (options_.planar.planar) {
-    const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
+    const std::string off = state_.floor.note(*floor(), state_.map->newestPose(), outcome.candidate->motion);
     if (step.reason.empty()) step.reason = off;
   }
   const std::string end = endOutage(outcome, found);

@@ -140,8 +140,9 @@ void OfflineRun::writeTiming(const std::string& path) const {
          << "," << 1e3 * extraction.describe_time << "," << 1e3 * odometry.match_time << ","
          << 1e3 * odometry.motion_time << "," << extraction.detected << "," << odometry.features << ","
          << odometry.matches << "," << odometry.inliers << "," << odometry.rms << "," << odometry.coverage << ","
-         << 1e3 * odometry.right_delay << "," << 1e3 * odometry.right_delay_sigma << "," << 1e3 * odometry.readout << ","
-         << 1e3 * odometry.readout_sigma << "," << toString(odometry.state) << "," << withoutCommas(odometry.reason) << "\n";
+         << 1e3 * odometry.right_delay << "," << 1e3 * odometry.right_delay_sigma << "," << 1e3 * odometry.readout
+         << "," << 1e3 * odometry.readout_sigma << "," << toString(odometry.state) << ","
+         << withoutCommas(odometry.reason) << "\n";
   }
   writeTextFile(path, file.str());
 }

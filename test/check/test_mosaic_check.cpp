@@ -27,7 +27,8 @@ cv::Mat mosaicOf(const cv::Mat& grey, double red, double blue) {
   for (int y = 0; y < grey.rows; ++y)
     for (int x = 0; x < grey.cols; ++x)
       if (y % 2 == x % 2)
-        mosaic.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>((y % 2 == 0 ? red : blue) * grey.at<std::uint8_t>(y, x));
+        mosaic.at<std::uint8_t>(y, x) =
+            cv::saturate_cast<std::uint8_t>((y % 2 == 0 ? red : blue) * grey.at<std::uint8_t>(y, x));
   return mosaic;
 }
 
@@ -40,7 +41,8 @@ cv::Mat rectified(const cv::Mat& image) {
 
 TEST(MosaicCheck, NamesTheSideThatHasThePattern) {
   const cv::Mat grey = scene();
-  for (const cv::Mat& mosaic : {mosaicOf(grey, 0.5, 0.7), mosaicOf(grey, 1.0, 0.45), rectified(mosaicOf(grey, 0.5, 0.7))}) {
+  for (const cv::Mat& mosaic :
+       {mosaicOf(grey, 0.5, 0.7), mosaicOf(grey, 1.0, 0.45), rectified(mosaicOf(grey, 0.5, 0.7))}) {
     MosaicCheck left, both;
     const auto [smooth, untouched] = left.add(mosaic, grey);
     EXPECT_LT(mosaicShare(smooth), 0.02);
@@ -54,7 +56,8 @@ TEST(MosaicCheck, NamesTheSideThatHasThePattern) {
 
 TEST(MosaicCheck, NothingIsLeftOfThePattern) {
   const cv::Mat smooth = withoutMosaic(mosaicOf(cv::Mat(16, 16, CV_8U, cv::Scalar(200)), 0.5, 0.7));
-  EXPECT_EQ(cv::norm(smooth, cv::Mat(16, 16, CV_8U, cv::Scalar(160)), cv::NORM_INF), 0.0);  // (0.5 + 1 + 1 + 0.7) / 4 of it
+  EXPECT_EQ(cv::norm(smooth, cv::Mat(16, 16, CV_8U, cv::Scalar(160)), cv::NORM_INF),
+            0.0);  // (0.5 + 1 + 1 + 0.7) / 4 of it
 }
 
 TEST(MosaicCheck, GreyImagesHaveNone) {
@@ -64,7 +67,8 @@ TEST(MosaicCheck, GreyImagesHaveNone) {
     if (y % 2 == 0) mesh.row(y).setTo(110);
   cv::Mat halved;
   cv::resize(scene(), halved, {}, 0.5, 0.5, cv::INTER_NEAREST);
-  for (const cv::Mat& image : {scene(), rectified(scene()), noise, mesh, halved, cv::Mat(240, 376, CV_8U, cv::Scalar(5))})
+  for (const cv::Mat& image :
+       {scene(), rectified(scene()), noise, mesh, halved, cv::Mat(240, 376, CV_8U, cv::Scalar(5))})
     EXPECT_LT(mosaicShare(image), 0.1);
   MosaicCheck check;
   check.add(scene(), scene());

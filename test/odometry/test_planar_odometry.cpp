@@ -23,11 +23,15 @@ std::vector<Eigen::Isometry3d> drive(int pairs, const Pitch& pitch, const Yaw& y
   return poses;
 }
 
-std::vector<OdometryResult> follow(const std::vector<Eigen::Isometry3d>& poses, bool planar) {
+/// `pitch`: deg, by which the odometry is told that the camera looks down.
+std::vector<OdometryResult> follow(const std::vector<Eigen::Isometry3d>& poses, bool planar, double pitch = 0.0) {
   static const synthetic::World world = synthetic::randomWorld(3, 25000, {-60.0, -8.0, -10.0}, {60.0, 4.0, 130.0});
   VisualOdometryOptions options;
   options.planar.planar = planar;
   VisualOdometry odometry(options);
+  Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
+  T_base_camera.linear() << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
+  odometry.mountAt(Eigen::AngleAxisd(pitch * kDegree, Eigen::Vector3d::UnitY()) * T_base_camera);
   std::vector<OdometryResult> results;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     synthetic::Sighting sighting;
@@ -63,8 +67,8 @@ TEST(PlanarOdometry, OnAFlatFloorTheHeightStaysAndTheRestIsNoWorse) {
   EXPECT_LT(errorAtEnd(planar, poses), errorAtEnd(free, poses) + 0.02);
   for (const OdometryResult& result : planar) EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
   // What the constraint gives is in the covariance: y of the camera is down.
-  EXPECT_LT(std::sqrt(planar.back().pose_covariance(1, 1)), 1.1 * options.planar_height_sigma)
-      << "y is down but for the tilt";
+  EXPECT_LT(std::sqrt(planar.back().pose_covariance(1, 1)), 1.5 * options.planar_height_sigma)
+      << "y is down but for the tilt; the mount is known by this height";
   EXPECT_LT(planar.back().pose_covariance(3, 3), free.back().pose_covariance(3, 3));
   EXPECT_GT(std::sqrt(planar.back().pose_covariance(2, 2)), 1e-3) << "of the way it says nothing";
 }
@@ -92,6 +96,23 @@ TEST(PlanarOdometry, ARampIsToldOfAndALevelStretchBehindItIsAnotherFloor) {
   }
   EXPECT_EQ(floors, 1);
   EXPECT_EQ(results.back().reason, "");
+}
+
+TEST(PlanarOdometry, AWrongMountIsInTheCovarianceOfTheHeight) {
+  const auto poses = drive(
+      60, [](int) { return 0.0; }, [](int i) { return 0.01 * std::sin(0.1 * i); });
+  for (const double pitch : {-3.0, 1.0, 3.0}) {
+    const Eigen::RowVector3d up(0.0, -std::cos(pitch * kDegree), -std::sin(pitch * kDegree));  // as told
+    double height = 0.0, worst = 0.0;
+    for (const OdometryResult& result : follow(poses, true, pitch)) {
+      const Eigen::RowVector3d in_camera = up * result.T_origin_camera.linear();
+      const double variance = in_camera * result.pose_covariance.topLeftCorner<3, 3>() * in_camera.transpose();
+      height = up * result.T_origin_camera.translation();
+      if (result.distance > 2.0) worst = std::max(worst, std::abs(height) / std::sqrt(variance));
+    }
+    EXPECT_GT(std::abs(height), 0.3) << "m: a base that climbs by " << pitch << " deg, in truth 0";
+    EXPECT_LT(worst, 4.0) << pitch;
+  }
 }
 
 }  // namespace sdvo::test_planar_odometry
