@@ -118,6 +118,7 @@ class VisualOdometry::Impl {
   std::string endOutage(const Outcome& outcome, const MotionHypothesis& found);
   bool isDoubtful(const Belief& belief) const;
   void rememberRolled(PairSearch& pair, Step& step);
+  void admitReadout(const PairSearch& pair, const std::optional<MeasuredPair>& measured, Step& step);
   void finish(const PairSearch& pair, Step& step);
 
   VisualOdometryOptions options_;
@@ -216,6 +217,7 @@ OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const s
   const std::vector<Evidence> evidence = evidenceAgainst(pair, measured);
   const Outcome outcome = judged(pair);
   Step step = outcome.candidate ? apply(outcome, pair, evidence) : unmeasured(pair, outcome.refusal, evidence);
+  admitReadout(pair, measured, step);
   state_.rig.learn(pair.features(), measured ? &*measured : nullptr, pair.found(), pair.rotation(),
                    step.state == TrackingState::kTracking && pair.scene());
   finish(pair, step);
@@ -525,6 +527,17 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::measure(const MotionHypothesis&
          << step.correction.tail<3>().norm() << " rad";
   step.reason = reason.str();
   return step;
+}
+
+/// Widens covariances by what is unknown of the shutter's readout.
+void VisualOdometry::Impl::admitReadout(const PairSearch& pair, const std::optional<MeasuredPair>& measured,
+                                        Step& step) {
+  if (!measured || !step.T_previous_current || !options_.calibration.enabled || options_.calibration.readout != 0.0)
+    return;
+  const Matrix6d moment = state_.rig.readout.momentOf(measured->features, pair.found(), measured->since_reference,
+                                                      state_.shutter.readout());
+  step.covariance += moment;
+  state_.covariance.addDoubt(moment, moment);
 }
 
 /// Widens covariances by the error of the pair's velocity, and keeps the pair until the next motion is known.

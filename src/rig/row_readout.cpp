@@ -13,6 +13,7 @@
 namespace sdvo {
 namespace {
 
+const double kKernelSquare = noiseGate(2) * NoiseOptions().corner * NoiseOptions().corner;  // px^2, of Cauchy's kernel
 constexpr std::size_t kAround = 4;  // pairs before and after one, whose mean rates give the slow rate there
 
 /// How a feature's position (u_left, v_left), px, depends on pose and readout.
@@ -22,6 +23,18 @@ struct Shift {
   Eigen::Matrix<double, 8, 2> derivative;
   Eigen::Vector2d residual;  ///< measured - projected, px
 };
+
+using Rates = std::array<Eigen::Vector3d, 2>;  // of rotation at the stamps of the pair before and of the pair, rad/s
+
+/// Shift of a point of the pair before in the pair, px for a readout of 1 s: the rotation in its row before moves the
+/// point, that in its row now moves the camera.
+Eigen::Vector2d shiftBy(const Rates& rates, const StereoCamera& camera, const Eigen::Matrix3d& R_current_previous,
+                        const Eigen::Vector3d& before, double row_before, double row_now,
+                        const Eigen::Matrix<double, 2, 6>& by_pose) {
+  const Eigen::Vector3d moved = R_current_previous * rates[0].cross(before);
+  return rowTime(camera, row_before) * by_pose.leftCols<3>() * moved -
+         rowTime(camera, row_now) * by_pose.rightCols<3>() * rates[1];
+}
 
 /// Factor on a variance that is estimated from `pairs`. With it, RowDelay::kSquare is exceeded as rarely as with a
 /// known variance: Student's distribution (Wallace 1959).
@@ -78,23 +91,19 @@ void RowReadout::measure() {
   const StereoCamera& camera = pair.camera;
   const Eigen::Isometry3d& T = pair.T_current_previous;
   // At the stamps of the previous pair and of this one.
-  const std::array<Eigen::Vector3d, 2> rates = {rateAt(kAround - 1), rateAt(kAround)};
-  const std::array<Eigen::Vector3d, 2> slow_rates = {slowRateAt(kAround - 1), slowRateAt(kAround)};
+  const Rates rates = {rateAt(kAround - 1), rateAt(kAround)};
+  const Rates slow_rates = {slowRateAt(kAround - 1), slowRateAt(kAround)};
   std::vector<Shift> shifts;
   for (const Track& track : pair.tracks) {
     const Eigen::Vector3d before = camera.backProject(track.before.x(), track.before.y(), track.before.z());
     const Eigen::Vector3d now = T * before;
     if (!(now.z() > camera.nearestDepth())) continue;
     const Eigen::Matrix<double, 2, 6> by_pose = motionJacobian(camera, T, before).topRows<2>();
-    // px for a readout of 1 s: the previous row's rotation moves the point, this row's rotation moves the camera.
-    const auto shiftBy = [&](const std::array<Eigen::Vector3d, 2>& rate) -> Eigen::Vector2d {
-      const Eigen::Vector3d moved = T.linear() * rate[0].cross(before);
-      return rowTime(camera, track.before.y()) * by_pose.leftCols<3>() * moved -
-             rowTime(camera, track.now.y()) * by_pose.rightCols<3>() * rate[1];
-    };
     Shift& shift = shifts.emplace_back();
     shift.derivative.topRows<6>() = by_pose.transpose();
-    shift.derivative.row(6) = shiftBy(rates).transpose(), shift.derivative.row(7) = shiftBy(slow_rates).transpose();
+    for (const auto& [row, rate] : {std::pair(6, &rates), std::pair(7, &slow_rates)})
+      shift.derivative.row(row) =
+          shiftBy(*rate, camera, T.linear(), before, track.before.y(), track.now.y(), by_pose).transpose();
     shift.residual = track.now - camera.project(now).head<2>();
   }
   if (static_cast<int>(shifts.size()) < kFewestMeasured) return;
@@ -102,7 +111,6 @@ void RowReadout::measure() {
   // Cauchy's kernel around the pair's own fit of pose and readout. Around a fit of the pose alone, the largest shifts
   // would have the least weight. The instrument has no part in the fit.
   constexpr int kPasses = 2;  // (chosen)
-  const double corner = NoiseOptions().corner, kernel_square = noiseGate(2) * corner * corner;
   using Vector = Eigen::Matrix<double, 8, 1>;
   Vector fit = Vector::Zero(), by_residual;
   if (information_ > 0.0) fit[6] = product_ / information_;
@@ -110,7 +118,7 @@ void RowReadout::measure() {
   for (int pass = 0; pass < kPasses; ++pass) {
     square.setZero(), by_residual.setZero();
     for (const Shift& shift : shifts) {
-      const double weight = 1.0 / (kernel_square + (shift.residual - shift.derivative.transpose() * fit).squaredNorm());
+      const double weight = 1.0 / (kKernelSquare + (shift.residual - shift.derivative.transpose() * fit).squaredNorm());
       square += weight * shift.derivative * shift.derivative.transpose();
       by_residual += weight * shift.derivative * shift.residual;
     }
@@ -141,6 +149,46 @@ std::optional<RowReadout::Estimate> RowReadout::estimate() const {
   const Estimate estimate{value, std::hypot(sigma, kModel * value)};
   if (!(estimate.sigma < RowDelay::kFail)) return std::nullopt;
   return estimate;
+}
+
+/// Second moment of the readout around `compensated`, s^2: it is zero or, in a rolling shutter, of some milliseconds.
+double RowReadout::squareAround(double compensated) const {
+  constexpr double kRolling = 0.5, kReadout = 0.02;  // chosen: ratio of cameras; s, usual ones have 5 to 30 ms
+  using Scalar = Eigen::Matrix<double, 1, 1>;
+  const auto known = estimate();
+  const double value = known ? known->value : 0.0, information = known ? 1.0 / (known->sigma * known->sigma) : 0.0;
+  const double rolling = probabilityOf(
+      logOdds(kRolling) + logBayesFactor<1>(Scalar(value), Scalar(information), Scalar(kReadout * kReadout)));
+  const double variance = 1.0 / (information + 1.0 / (kReadout * kReadout));
+  const double apart = variance * information * value - compensated;
+  return (1.0 - rolling) * compensated * compensated + rolling * (variance + apart * apart);
+}
+
+Matrix6d RowReadout::momentOf(const StereoFeatures& features, const MotionHypothesis& found, double dt,
+                              double compensated) const {
+  if (pairs_.empty()) return Matrix6d::Zero();
+  const StereoCamera& camera = features.camera;
+  const Eigen::Isometry3d& T = found.motion.T_current_reference;
+  // As RollingShutter::velocityAt() and velocityBetween().
+  const Eigen::Vector3d rate = logSO3(T.linear().transpose()) / dt, rate_before = pairs_.back().rate;
+  const Rates rates = {0.5 * (rate_before + rate), rate + 0.25 * (rate - rate_before)};
+  const std::vector<Track> tracks = tracksOf(features, found);
+  if (static_cast<int>(tracks.size()) < kFewestMeasured) return Matrix6d::Zero();
+  Matrix6d information = Matrix6d::Zero();
+  Vector6d product = Vector6d::Zero();
+  for (const Track& track : tracks) {
+    const Eigen::Vector3d before = camera.backProject(track.before.x(), track.before.y(), track.before.z());
+    const Eigen::Vector3d now = T * before;
+    if (!(now.z() > camera.nearestDepth())) continue;
+    const Eigen::Matrix<double, 2, 6> by_pose = motionJacobian(camera, T, before).topRows<2>();
+    const double weight = 1.0 / (kKernelSquare + (track.now - camera.project(now).head<2>()).squaredNorm());
+    information += weight * by_pose.transpose() * by_pose;
+    product += weight * by_pose.transpose() *
+               shiftBy(rates, camera, T.linear(), before, track.before.y(), track.now.y(), by_pose);
+  }
+  const Vector6d by_readout = information.ldlt().solve(product);
+  if (!by_readout.allFinite()) return Matrix6d::Zero();
+  return squareAround(compensated) * by_readout * by_readout.transpose();
 }
 
 /// Whether the readout is compensated: from its proof on, until it is no longer significant.

@@ -9,6 +9,7 @@
 
 #include "../belief/motion_hypotheses.hpp"
 #include "row_delay.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 namespace sdvo {
@@ -37,6 +38,10 @@ class RowReadout {
   void interrupt() { pairs_.clear(), last_positions_.clear(); }
 
   std::optional<Estimate> estimate() const;
+
+  /// What the unknown readout adds to the covariance of a pair's motion: its second moment around `compensated`, s.
+  /// Call it before add() of the same pair.
+  Matrix6d momentOf(const StereoFeatures& features, const MotionHypothesis& found, double dt, double compensated) const;
   /// The estimate, s, from when the shutter was certainly rolling and the standard deviation below kWarn; else 0.
   double usableValue() const { return is_compensated_ ? product_ / information_ : 0.0; }
 
@@ -55,6 +60,7 @@ class RowReadout {
   };
   std::vector<Track> tracksOf(const StereoFeatures& features, const MotionHypothesis& found) const;
   void measure();
+  double squareAround(double compensated) const;
   bool isCompensated() const;
 
   std::deque<Pair> pairs_;                   ///< the last ones; each continues the one before

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "../../src/rig/row_readout.hpp"
@@ -25,14 +27,18 @@ Eigen::Isometry3d motionSince(double time) {
   return T;
 }
 
+struct Watched : RowReadout {
+  std::vector<double> variances{};  ///< rad^2, of each pair's turn, by what is unknown of the readout
+};
+
 /// 80 pairs, seen with a readout, s, and 0.3 px of noise. Half of the points of each are seen in the next one, too.
-RowReadout watched(double readout) {
+Watched watched(double readout) {
   constexpr int kPoints = 200;
   const StereoCamera camera = synthetic::camera();
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
-  RowReadout result;
+  Watched result;
   std::vector<Eigen::Vector3d> old, now;  // points in the last camera's frame, in this one's
   StereoFeatures before;
   for (int pair = 0; pair < 80; ++pair) {
@@ -62,6 +68,9 @@ RowReadout watched(double readout) {
       found.matches.push_back({static_cast<int>(i), static_cast<int>(i), 0.f});
     }
     found.view = view;
+    const double compensated = result.usableValue();
+    result.variances.push_back(
+        result.momentOf(features, found, kInterval, compensated).bottomRightCorner<3, 3>().trace());
     result.add(features, found, kInterval);
     before = features;
     old.assign(now.end() - kPoints, now.end());
@@ -77,6 +86,16 @@ TEST(RowReadout, FindsARollingShutter) {
     EXPECT_LT(std::abs(found->value - readout), 3.0 * found->sigma);
     EXPECT_LT(found->sigma, 0.003);
     EXPECT_TRUE(found->isRolling());
+  }
+}
+
+TEST(RowReadout, MotionsContainWhatIsUnknownOfIt) {
+  for (const double readout : {0.0, 0.025}) {
+    const std::vector<double> variances = watched(readout).variances;
+    const double at_first = *std::max_element(variances.begin(), variances.begin() + 10);
+    const double at_last = *std::max_element(variances.end() - 10, variances.end());
+    EXPECT_GT(std::sqrt(at_first), 5e-4) << "rad: a quarter of 14 ms times a change of the rate by 0.2 rad/s";
+    EXPECT_LT(std::sqrt(at_last), 0.2 * std::sqrt(at_first)) << readout;
   }
 }
 
