@@ -77,7 +77,8 @@ bool isObject(const Points& points, const Points& others) {
 }
 
 /// Whether a row of the image separates points from others, as in a torn or damaged image. Their numbers do not imply
-/// which part shows the camera's motion. Chance divides points so with kTailProbability at most.
+/// which part shows the camera's motion. If points fall on either side by chance, with the ratios p and q of all n, one
+/// division has a probability of p^(p n) q^(q n), which is less than max(p, q)^n.
 bool areDivided(const Points& points, const Points& others) {
   constexpr double kWrongInliers = 0.1;  // of either side (chosen): some wrong matches agree by chance
   const auto rowsOf = [](const Points& pixels) {
@@ -206,6 +207,7 @@ std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypo
                       explanations.areTorn(chosen, k)};
     const int features = static_cast<int>(rival.features.size());
     const double chance = chanceOfAgreement(threshold, hypotheses[k].gate);
+    // A rival that searched in a wider gate may have more points than the chosen one has outliers.
     if (logFalseAlarms(std::max(outliers, features), features, chance) > std::log(kTailProbability)) continue;
     const auto same = std::find_if(rivals.begin(), rivals.end(), [&](const RivalMotion& before) {
       return explanations.areOne(before.hypothesis, k);
@@ -276,9 +278,11 @@ PlaceBelief choosePlace(const FoundPlace& place, const std::vector<ExpectedMotio
   if (place.alike)
     belief.mixture.add({logWeight(other) - logWeight(chosen), momentOf(logSE3(chosen * other.inverse())),
                         "other places of the map look alike"});
-  // Or the map matched by chance, and the camera moved as one of the priors says.
+  // Or the map matched by chance, and the camera moved as one of the priors says, though it is in no known place. The
+  // priors were asked for a place: that they alone are right has the probability of a tail.
+  const double by_chance = kTailProbability * place.chance;
   for (const ExpectedMotion& expected : prior)
-    belief.mixture.add({std::log(kTailProbability * place.chance) - logWeight(chosen),
+    belief.mixture.add({std::log(by_chance) - logWeight(chosen),
                         momentOf(expected.innovation(chosen.inverse())) + expected.covariance,
                         "the place may be another one"});
   return belief;
@@ -297,6 +301,8 @@ void MotionHypothesis::replaceMotion(const MotionScene& scene, const Eigen::Isom
   double kept_sightings = 0.0, dropped_sightings = 0.0;
   for (const int i : motion.inliers)
     (contains(dropped, matches[i].current) ? dropped_sightings : kept_sightings) += sightingsOf(i);
+  // Two bodies move: the found motion is that of the dropped points, the new one that of the others. Each leaves the
+  // points of the other one unexplained.
   const double found_is_right =
       probabilityOf(logLikelihood(kept_sightings, points) - logLikelihood(dropped_sightings, points));
   rivals_moment += found_is_right * momentOf(logSE3(apart));
@@ -369,11 +375,12 @@ double logLikelihood(double unexplained_sightings, int points) {
 
 double logAgreement(const Agreement& agreement) {
   if (agreement.lasting_matches == 0) return 0.0;
-  const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
+  // Probability that a lasting point is a mover's, and agrees with the mover's motion.
+  const double of_mover = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
   const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
   return effectiveNumber(agreement.lasting_matches) *
-         (ratio * std::log(kLastingAgreement / by_chance) +
-          (1.0 - ratio) * std::log((1.0 - kLastingAgreement) / (1.0 - by_chance)));
+         (ratio * std::log(kLastingAgreement / of_mover) +
+          (1.0 - ratio) * std::log((1.0 - kLastingAgreement) / (1.0 - of_mover)));
 }
 
 double logOddsWrong(const MotionHypothesis& hypothesis) {

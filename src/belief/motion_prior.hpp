@@ -85,6 +85,8 @@ class MotionPrior {
   /// Covariance, m^2 and rad^2, of a motion over `dt` s under white acceleration. Its prediction is a mean velocity
   /// over `before` s, an interval that ended `age` s earlier.
   Matrix6d processNoise(double dt, double before, double age) const;
+  /// s: an interval by two stamps is not longer; the acceleration had so much time.
+  double longest(double dt) const { return dt + 2.0 * options_.stamp_sigma; }
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
   MotionPriorOptions options_;

@@ -11,9 +11,8 @@ namespace {
 
 /// The covariance of a pose T as that of T * M: T exp(xi) M = T M exp(Ad(M^-1) xi).
 Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) {
-  const Matrix6d ad = adjoint(motion.inverse());
-  const Matrix6d carried = ad * covariance * ad.transpose();
-  return 0.5 * (carried + carried.transpose());
+  const Matrix6d moved = carried(motion.inverse(), covariance);
+  return 0.5 * (moved + moved.transpose());
 }
 
 /// The covariance with translation and rotation scaled up to their traces before, if these were larger.

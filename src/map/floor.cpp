@@ -8,7 +8,7 @@
 namespace sdvo {
 namespace {
 
-constexpr double kBend = noiseGate(1);  // square of the residual, in standard deviations, at which the kernel bends
+constexpr double kKernelSquare = noiseGate(1);  // of Cauchy's kernel, in standard deviations
 
 }  // namespace
 
@@ -39,11 +39,11 @@ Eigen::Vector3d Floor::residual(const Eigen::Isometry3d& T_camera_origin, Jacobi
 }
 
 double Floor::cost(double square) {
-  return kBend * std::log1p(square / kBend);
+  return kKernelSquare * std::log1p(square / kKernelSquare);
 }
 
 double Floor::weight(double square) {
-  return 1.0 / (1.0 + square / kBend);
+  return 1.0 / (1.0 + square / kKernelSquare);
 }
 
 Eigen::Matrix<double, 6, 3> Floor::gain(const Jacobian& jacobian, const Matrix6d& covariance) const {
@@ -57,6 +57,7 @@ Eigen::Isometry3d Floor::settled(const Eigen::Isometry3d& T_camera_origin, const
   const Eigen::Vector3d found = residual(T_camera_origin, &jacobian);
   if (!isOn(found)) return T_camera_origin;
   const Eigen::Isometry3d T_origin_camera = T_camera_origin.inverse();
+  // The window's poses have met this floor already: the covariance is that after it.
   const Vector6d step = gain(jacobian, constrained(T_origin_camera, covariance)) * found;
   return expSE3(-step) * T_camera_origin;
 }

@@ -6,7 +6,6 @@
 #include <unordered_map>
 
 #include "../common/statistics.hpp"
-#include "../motion/correspondence_arrays.hpp"
 
 namespace sdvo {
 namespace {
@@ -227,20 +226,22 @@ bool LocalMap::needsKeyframe() const {
   return median(parallax) > options_.keyframe_parallax;
 }
 
+/// Remembers a key frame, once, when it is none of the `keyframes` newest ones any more. It may stay in the map.
+void LocalMap::rememberKeyframe(const Frame& frame) {
+  if (frame.id <= last_remembered_) return;
+  last_remembered_ = frame.id;
+  if (options_.remembered_keyframes == 0 || frame.is_recalled) return;
+  OldKeyframe old = keyframe(frame);
+  // With fewer points it could not be recalled.
+  if (old.described.count() >= options_.lasting_points) memory_.remember(camera_, std::move(old));
+}
+
 /// Removes key frames that are older than the `keyframes` newest ones: the oldest that shares too few points with the
 /// newest pair, and while they are too many, the one with the least parallax to the frame before.
 void LocalMap::forgetKeyframe() {
   // Number of frames before these newest ones and the newest pair.
   const auto older = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
-  const std::size_t leaving = older() - 1;
-  if (frames_[leaving].id > last_leaving_) {
-    last_leaving_ = frames_[leaving].id;
-    if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled) {
-      OldKeyframe old = keyframe(frames_[leaving]);
-      // With fewer points it could not be recalled.
-      if (old.described.count() >= options_.lasting_points) memory_.remember(camera_, std::move(old));
-    }
-  }
+  rememberKeyframe(frames_[older() - 1]);
   const std::vector<int> shared = sharedPoints();
   const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(older()),
                                     [&](int points) { return points < options_.lasting_points; });
@@ -445,7 +446,9 @@ double LocalMap::varianceOfMotion() const {
 }
 
 void LocalMap::rejectOutliers(const Problem& problem, const std::vector<double>& squares, Adjustment& adjustment) {
-  const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as its observation's
+  // Of a position in the image: of several disparities, which share an error, one hardly counts. The point's position
+  // errs as much as its observation's.
+  const double gate = 2.0 * noiseGate(2);
   for (const int i : problem.newest) {
     // The sigma of a corner that no patch confirms allows for a neighbour's corner. The gate does not: the point's own
     // corner lies within a corner's noise.

@@ -86,7 +86,8 @@ class LocalMap {
               const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
               const RigCalibration& calibration);
 
-  /// Moves the newest pair's observations from its features as they were inserted to the same features elsewhere.
+  /// Moves the newest pair's observations from its features as they were inserted to the same features elsewhere, once
+  /// a better velocity has moved the rows of a rolling shutter.
   void moveNewest(const StereoFeatures& before, const StereoFeatures& now, const RigCalibration& calibration);
 
   /// The remembered key frame to whose place the newest pair has come back. Null if there is none, if the map still has
@@ -172,6 +173,7 @@ class LocalMap {
 
   const Frame& oldest() const;
   Problem problem() const;
+  void rememberKeyframe(const Frame& frame);
   void forgetKeyframe();
   OldKeyframe keyframe(const Frame& frame) const;
   std::vector<int> sharedPoints() const;
@@ -192,7 +194,7 @@ class LocalMap {
   std::deque<Frame> frames_;
   std::vector<Point> points_;
   KeyframeMemory memory_;
-  int last_leaving_ = -1;  ///< id of the newest key frame that is older than the `keyframes` newest ones
+  int last_remembered_ = -1;  ///< id of the newest key frame that was older than the `keyframes` newest ones
 };
 
 }  // namespace sdvo

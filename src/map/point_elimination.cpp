@@ -84,8 +84,10 @@ SDVO_IN_KERNEL void addProduct(const double* a, const double* b, double* block) 
   }
 }
 
-/// Three columns of a pose, each number in as many lanes as a product of 6x6 takes it: two columns of the product fill
-/// three registers.
+/// Three columns of a pose, each number in as many lanes as a product of 6x6 takes it. Two columns of the product, rows
+/// 0 to 5, fill three registers of four lanes:
+///   0 1 2 3 | 4 5 0 1 | 2 3 4 5
+///   first column   | second column
 class SpreadColumns {
  public:
   SDVO_IN_KERNEL explicit SpreadColumns(const double* columns) {
@@ -103,7 +105,7 @@ class SpreadColumns {
   /// block += sign a b^T, where b are these columns and block is 6x6, column by column.
   template <int kSign>
   SDVO_IN_KERNEL void addProduct(const double* a, double* block) const {
-    constexpr int kRowOf[] = {0, 4, 2};  // at which a register begins; the first two rows follow the last one
+    constexpr int kRowOf[] = {0, 4, 2};  // at which a register begins; `a` has rows 0 and 1 again after row 5
     DoubleLanes of_a[3][3];
     for (int m = 0; m < 3; ++m)
       for (int i = 0; i < 3; ++i) load(a + kFactorRows * m + kRowOf[i], of_a[m][i]);

@@ -12,7 +12,8 @@ namespace sdvo {
 namespace {
 
 /// Square of the mean residual of a point's disparities, in standard deviations: the error that they share. The point's
-/// estimate follows a part of that error; the result is corrected for this part. None if it is more than half.
+/// estimate follows the part f of that error; with the noise of positions, the residual has (1 - f) of its variance.
+/// None if f is more than half.
 std::optional<double> commonSquare(const EliminatedPoint& point) {
   constexpr int kFewest = 4;
   if (point.observations < kFewest) return std::nullopt;
@@ -113,9 +114,9 @@ class WindowOptimizer::Solver {
     }
   }
 
-  /// Square of the residual at which the Cauchy kernel bends: a square s costs bend * log(1 + s / bend).
-  double bend() const { return options_.kernel_scale * options_.kernel_scale; }
-  double weight(double square) const { return bend() / (bend() + square); }
+  /// Square of the Cauchy kernel's scale k: a square s costs k^2 log(1 + s / k^2).
+  double kernelSquare() const { return options_.kernel_scale * options_.kernel_scale; }
+  double weight(double square) const { return kernelSquare() / (kernelSquare() + square); }
 
   /// The cost of an estimate. Also writes the square of each observation's residual.
   double cost(const Estimate& estimate, std::vector<double>& squares) {
@@ -137,7 +138,7 @@ class WindowOptimizer::Solver {
     placeAnchors(estimate_);
     PoseFactor* factors = factors_.data();
     for (std::size_t p = 0; p < points_.size(); ++p) {
-      points_[p] = equations_.add(projection, observedPoint(estimate_, p), {bend(), damping}, factors,
+      points_[p] = equations_.add(projection, observedPoint(estimate_, p), {kernelSquare(), damping}, factors,
                                   linearised_squares_.data() + first_of_point_[p]);
       factors += points_[p].factors;
     }
@@ -238,19 +239,21 @@ class WindowOptimizer::Solver {
     double bread;  ///< from the normal equations to the second derivatives
     double meat;   ///< from the products of gradients to those at the result
   };
-  /// An observation with the weight w adds w times a product of Jacobians to the normal equations. To the second
-  /// derivatives it adds w^2 times that, on average over the two directions of its residual; to the meat also w^2. The
-  /// elimination of the point leaves w_i - w_i^2 / sum(w) of each. The factors are ratios of the sums of these.
+  /// An observation with the weight w = 1 / (1 + s) adds w times a product of Jacobians to the normal equations. The
+  /// second derivative of its cost is 2 w^2 - w along the residual of the square s, and w across it: w^2 on average of
+  /// the image's two directions. Gradients are w times the residual, so the meat has w^2, too; the residuals' own size is
+  /// that of meatOverBread(), before and now. The elimination of the point leaves w_i - w_i^2 / sum(w) of each. The
+  /// factors are ratios of the sums of these.
   SandwichScale sandwichScale() const {
     double weights = 0.0, before = 0.0, now = 0.0;
     for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
-      double w1 = 0.0, w2 = 0.0, w4 = 0.0, now2 = 0.0, now4 = 0.0;  // powers
+      double sum_w = 0.0, sum_w2 = 0.0, sum_w4 = 0.0, sum_now2 = 0.0, sum_now4 = 0.0;
       for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
-        const double w = weight(linearised_squares_[i]), square = w * w, w_now = weight(squares_[i]),
-                     now_square = w_now * w_now;
-        w1 += w, w2 += square, w4 += square * square, now2 += now_square, now4 += now_square * now_square;
+        const double w = weight(linearised_squares_[i]), w2 = w * w, w_now = weight(squares_[i]), now2 = w_now * w_now;
+        sum_w += w, sum_w2 += w2, sum_w4 += w2 * w2, sum_now2 += now2, sum_now4 += now2 * now2;
       }
-      weights += w1 - w2 / w1, before += w2 - w4 / w2, now += now2 - now4 / now2;
+      weights += sum_w - sum_w2 / sum_w;
+      before += sum_w2 - sum_w4 / sum_w2, now += sum_now2 - sum_now4 / sum_now2;
     }
     return {now / std::max(weights, 1e-12), now / std::max(before, 1e-12)};
   }
@@ -319,9 +322,9 @@ class WindowOptimizer::Solver {
 
   double costOf(const Estimate& estimate, const std::vector<double>& squares) const {
     LogSum costs;
-    for (const double square : squares) costs.add(square / bend());
+    for (const double square : squares) costs.add(square / kernelSquare());
     const RigCalibration::Vector error = estimate.calibration.value - window_->calibration_prior.mean;
-    return error.dot(window_->calibration_prior.information * error) + bend() * costs.value() + floorCost(estimate);
+    return error.dot(window_->calibration_prior.information * error) + kernelSquare() * costs.value() + floorCost(estimate);
   }
 
   double floorCost(const Estimate& estimate) const {

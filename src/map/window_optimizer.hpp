@@ -32,7 +32,7 @@ struct Window {
 
 struct WindowOptimizerOptions {
   int iterations = 1;         ///< most accepted Levenberg-Marquardt steps for each pair
-  double kernel_scale = 1.0;  ///< sigma: normalised residual at which the Cauchy kernel bends
+  double kernel_scale = 1.0;  ///< sigma: normalised residual that has half the weight
   NoiseOptions noise;
 };
 

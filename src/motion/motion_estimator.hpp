@@ -19,7 +19,8 @@ struct MotionEstimate {
   bool success = false;
   std::string reason;  ///< of a failure
   Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
-  /// Covariance of the left perturbation xi = (translation, rotation) in exp(xi) * T_current_reference, m and rad.
+  /// Covariance of the left perturbation xi = (translation, rotation) in exp(xi) * T_current_reference, m and rad;
+  /// -xi is the right one of T_reference_current.
   Matrix6d covariance = Matrix6d::Zero();
   std::vector<int> inliers;  ///< indices of the correspondences, ascending
   double rms = 0.0;          ///< of the inliers' residuals, px per coordinate

@@ -16,12 +16,12 @@ class Lineariser {
   }
 
   NormalEquations at(const Eigen::Isometry3d& T) {
-    const double bend = kernel_scale_ * kernel_scale_, inverse_bend = 1.0 / bend;
+    const double kernel_square = kernel_scale_ * kernel_scale_, inverse_square = 1.0 / kernel_square;
     NormalEquations equations;
     LogSum costs;
     arrays_.squareResiduals(camera_, T, 0, static_cast<int>(weights_.size()), weights_.data());
     for (std::size_t i = 0; i < weights_.size(); ++i) {
-      const double square = std::exchange(weights_[i], 0.0), bent = square * inverse_bend;
+      const double square = std::exchange(weights_[i], 0.0), bent = square * inverse_square;
       if (static_cast<int>(i) >= arrays_.count() || std::isinf(square)) continue;
       costs.add(bent);
       weights_[i] = 1.0 / (1.0 + bent);
@@ -29,7 +29,7 @@ class Lineariser {
       equations.weight += weights_[i];
     }
     arrays_.sumEquations(camera_, T, weights_.data(), equations.hessian, equations.gradient);
-    equations.cost = bend * costs.value();
+    equations.cost = kernel_square * costs.value();
     return equations;
   }
 
@@ -44,7 +44,7 @@ class Lineariser {
 
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
                              const std::vector<Correspondence>& correspondences, Eigen::Isometry3d& T) {
-  constexpr double kSmallestGain = 1e-5;  // of the cost: such a step is a tenth of the result's standard deviation
+  constexpr double kSmallestGain = 1e-5;  // of the cost: a tenth of the deviation of a result by 300 inliers
   double damping = 1e-6;
   Lineariser problem(camera, options, correspondences);
   NormalEquations equations = problem.at(T);

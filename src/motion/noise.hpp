@@ -39,8 +39,8 @@ class Noise {
   /// px: two aligned positions that are further apart are not of one point.
   double alignedGate() const { return std::sqrt(2.0 * noiseGate(2)) * NoiseOptions::kReference; }
 
-  /// Takes in the square, in standard deviations (chi-square of six), by which the motions of two parts of a confirmed
-  /// motion's inliers differ.
+  /// Takes in the square, in standard deviations, by which the motion of a confirmed motion's lasting inliers differs
+  /// from that of all. It is chi-square of six if points err independently.
   void learnShared(double square) { shared_ += (1.0 - kUsualMemory) * (square / 6.0 - shared_); }
 
   /// Takes in the median square, in standard deviations (chi-square of two), of a confirmed pair's residuals in the

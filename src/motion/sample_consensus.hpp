@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "motion_refinement.hpp"

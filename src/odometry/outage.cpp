@@ -25,11 +25,10 @@ void Outage::extend(double dt, const std::optional<MotionGuess>& guess, const Mo
   if (!guess) guessed_motion_.reset();
   if (!guessed_motion_) return;
   const Eigen::Isometry3d motion = motionBy(*guess, prior, dt);
-  const Matrix6d carried = adjoint(motion.inverse());
   Matrix6d covariance = covarianceOf(*guess, prior.around(motion, dt).covariance);
   if (guess->rotation_only) covariance.topLeftCorner<3, 3>() = growth(prior, dt).topLeftCorner<3, 3>();
   guessed_motion_->motion = guessed_motion_->motion * motion;
-  guessed_motion_->covariance = carried * guessed_motion_->covariance * carried.transpose() + covariance;
+  guessed_motion_->covariance = carried(motion.inverse(), guessed_motion_->covariance) + covariance;
   guessed_motion_->rotation_only |= guess->rotation_only;
 }
 

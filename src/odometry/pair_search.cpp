@@ -23,7 +23,7 @@ PairSearch::PairSearch(const VisualOdometryOptions& options, const SearchTools& 
   // Either the lens moved, or camera_info changed without it: a fault of the driver, or a new calibration.
   const double by_given = logLikelihood();
   searchBy(*state.lens);
-  const double ratio = (logLikelihood() - by_given) / state.rig.noise.shared();
+  const double ratio = (logLikelihood() - by_given) / state.rig.noise.shared();  // so many points err as one
   if (!(kUnsuspected + ratio > 0.0)) searchBy(given.camera);
 }
 
@@ -34,11 +34,11 @@ void PairSearch::searchBy(const StereoCamera& lens) {
     kind_ = kNoMap;
   else if (state_.interrupted)
     kind_ = kAfterOutage;
-  else if ((frozen_ = logOddsOfFrozen()) >= kCertain)
+  else if ((log_odds_of_frozen_ = findRepeated()) >= kCertain)
     kind_ = kFrozen;
   else
     kind_ = kContinues;
-  compensate();
+  compensate(Eigen::Vector3d::Zero());
   findRotated();
 }
 
@@ -67,8 +67,8 @@ bool PairSearch::movesFeatures(const StereoCamera& before) const {
   return false;
 }
 
-/// Of the motion that is found, by its inliers' aligned positions, up to a constant. A wrong match costs the gate. All
-/// counts half, for the map's points err as much as the pair's.
+/// Of the motion that is found, by its inliers' aligned positions, up to a constant: half of each square, up to the gate,
+/// which is what a wrong match costs. All counts half, for the map's points err as much as the pair's.
 double PairSearch::logLikelihood() const {
   const StereoCamera& camera = features().camera;
   const NoiseOptions& noise = options_.noise;
@@ -98,33 +98,34 @@ std::optional<Eigen::Isometry3d> PairSearch::expectedMotion(const std::optional<
 /// Log-odds that images repeat although the camera moved. The guess, or the last motion, implies whether it did. A
 /// robot may stop from one pair to the next as far as the prior allows; unless images show noise, the first repeated
 /// pair decides.
-double PairSearch::logOddsOfFrozen() const {
+double PairSearch::findRepeated() const {
   const StereoFeatures& features = taken();
   const RepeatedImages& images = state_.images;
   if (!images.repeat(features)) return kUnsuspected;
   const auto moved = [&](const Eigen::Isometry3d& T_previous_current) {
     return RepeatedImages::shouldHaveMoved(features, state_.rig.noise.sameMotion(), T_previous_current);
   };
+  // Another odometry knows.
   if (guess_ && !guess_->rotation_only) return moved(guess_->T_previous_current) ? kCertain : kUnsuspected;
-  if (state_.frozen) return kCertain;
-  Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
-  if (guess_) turn.linear() = guess_->T_previous_current.linear();
-  if (moved(turn)) return kCertain;
+  if (state_.frozen) return kCertain;  // it goes on
+  // A gyro knows that the camera turned, but not that it stood.
+  if (guess_ && moved(Eigen::Isometry3d(guess_->T_previous_current.linear()))) return kCertain;
+  // Without a motion that images would show, the camera may stand.
   const auto prior = state_.prior.priorByConfirmed(*state_.last_stamp, dt_);
   const auto expected = expectedMotion(std::nullopt);
   if (!prior || !moved(expected.value_or(prior->motion))) return kUnsuspected;
   if (images.comeTwice()) return kCertain;
   const double old = images.logOddsOfOld(features.report.noise);
+  // The pair before repeated, too, and was taken for a stop: the camera stands.
   if (images.inARow() > 0 && !(old > 0.0)) return kUnsuspected;
   const double stop = 0.5 * prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero());
   return std::min(old + std::min(stop, -std::log(kTailProbability)), kCertain);
 }
 
-/// Features as of a right camera that did not rotate and is synchronous.
-void PairSearch::compensate() {
-  const LearntRig& rig = state_.rig;
-  const bool is_new = rotation_.log_odds > 0.0;
-  const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + rotation_.value) : rig.rotation;
+/// Features as of a right camera that did not rotate, neither as is known nor by `new_rotation` (rad) beyond, and is
+/// synchronous.
+void PairSearch::compensate(const Eigen::Vector3d& new_rotation) {
+  const Eigen::Vector3d rotation = state_.rig.rotation + new_rotation;
   rotated_back_.reset();
   if (!rotation.isZero()) rotated_back_ = rotatedBack(part(), rotation);
   const bool has_map = kind_ == kContinues || kind_ == kAfterOutage;
@@ -225,28 +226,28 @@ RotationHypothesis PairSearch::rotationBeyond(const Eigen::Vector3d& compensated
   return state_.rig.rotationHypothesis(features(), found_, compensated, turns, dt_);
 }
 
-void PairSearch::compensateFor(const RotationHypothesis& rotation) {
-  rotation_ = rotation;
-  compensate();
-}
-
-/// If the right camera seems to have rotated, features are compensated again and the search is repeated. Without a
-/// motion of most matches, a yaw of the right camera is tried; it is kept if more matches agree.
+/// If the right camera seems to have rotated, features are compensated again and the search is repeated.
 void PairSearch::findRotated() {
   rotation_ = rotationBeyond(Eigen::Vector3d::Zero());
-  if (kind_ == kContinues && scene_->T_current_reference && !found_.isOfMajority()) {
-    // After a knock beyond the matches' noise no motion explains both views, but the left one alone may be explained.
-    const RotationHypothesis at_first = rotation_;
-    const int inliers = found_.agreement.inliers;
-    const Eigen::Vector3d yaw = yawByDisparities(given_.camera, found_.correspondences, *scene_->T_current_reference);
-    compensateFor({yaw, Eigen::Matrix3d::Zero(), kCertain, kUnsuspected});  // as if certain, for a trial
-    rotation_ = rotationBeyond(yaw);
-    if (!found_.motion.success || found_.agreement.inliers <= inliers || !(rotation_.log_odds > 0.0))
-      compensateFor(at_first), findGlobal();
-  }
+  if (kind_ == kContinues && scene_->T_current_reference && !found_.isOfMajority()) tryYaw();
   if (!(rotation_.log_odds > 0.0)) return;
-  compensate();
+  compensate(rotation_.value);
   findGlobal();
+}
+
+/// Without a motion of most matches, a yaw of the right camera is tried: after a knock beyond the matches' noise no
+/// motion explains both views, but the left one alone may be explained. It is kept if more matches agree.
+void PairSearch::tryYaw() {
+  const int inliers = found_.agreement.inliers;
+  const Eigen::Vector3d yaw = yawByDisparities(given_.camera, found_.correspondences, *scene_->T_current_reference);
+  compensate(yaw);
+  const RotationHypothesis with_yaw = rotationBeyond(yaw);
+  if (found_.motion.success && found_.agreement.inliers > inliers && with_yaw.log_odds > 0.0) {
+    rotation_ = with_yaw;
+  } else {
+    compensate(rotation_.log_odds > 0.0 ? rotation_.value : Eigen::Vector3d::Zero());
+    findGlobal();
+  }
 }
 
 /// The map, the pair, and the expected motion between them: that of predicted pairs since the reference, then the

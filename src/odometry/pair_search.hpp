@@ -33,6 +33,10 @@ class PairSearch {
   PairSearch(const PairSearch&) = delete;  // its parts refer to each other
   PairSearch& operator=(const PairSearch&) = delete;
 
+  // The features on their way, each without the error before it, where there is one:
+  // given -> whole(), in the map's pixels -> part(), without repeated rows -> taken(), rotated back -> inStep(), left and
+  // right at one moment -> features(), all rows at one moment.
+
   enum Kind {
     kNoMap,        ///< no map of its camera: it begins one
     kAfterOutage,  ///< its pose in the map is unknown: it is looked for in all maps
@@ -42,7 +46,8 @@ class PairSearch {
   Kind kind() const { return kind_; }
 
   double dt() const { return dt_; }          ///< since the previous pair, s
-  double frozen() const { return frozen_; }  ///< log-odds that its images repeat although the camera moved
+  /// That its images repeat although the camera moved.
+  double logOddsOfFrozen() const { return log_odds_of_frozen_; }
 
   /// All features in the map's camera.
   const StereoFeatures& whole() const { return refocused_ ? *refocused_ : given_; }
@@ -77,18 +82,18 @@ class PairSearch {
   bool movesFeatures(const StereoCamera& before) const;
   double logLikelihood() const;
   std::optional<Eigen::Isometry3d> expectedMotion(const std::optional<MotionGuess>& guess) const;
-  double logOddsOfFrozen() const;
-  void compensate();
+  double findRepeated() const;
+  void compensate(const Eigen::Vector3d& new_rotation);
   std::optional<StereoFeatures> synchronised(const Vector6d& velocity) const;
   void roll(const Vector6d& velocity);
   bool rollAgain();
-  // Each of the next four repeats the one before it with features that are compensated better.
+  // Each repeats the one before it with features that are compensated better.
   Vector6d find();
   Vector6d findSynchronised();
   Vector6d findGlobal();
-  void findRotated();
   RotationHypothesis rotationBeyond(const Eigen::Vector3d& compensated);
-  void compensateFor(const RotationHypothesis& rotation);
+  void findRotated();
+  void tryYaw();
   MotionScene sceneOf(const LocalMap& map, double dt, const std::optional<MotionGuess>& guess) const;
   std::optional<MotionScene> reacquired() const;
 
@@ -100,7 +105,7 @@ class PairSearch {
   StereoCamera lens_;
   Kind kind_ = kNoMap;
   double dt_ = 0.0;
-  double frozen_ = kUnsuspected;
+  double log_odds_of_frozen_ = kUnsuspected;
   std::vector<int> new_features_;
   std::optional<StereoFeatures> refocused_, new_part_, rotated_back_, synchronised_;
   std::optional<RolledPair> rolled_;      // only with a rolling shutter, as the next three

@@ -49,6 +49,13 @@ void beginFallbackMap(const VisualOdometryOptions& options, const StereoFeatures
 
 }  // namespace
 
+/// In this order:
+///   few features, a guess:      the pose goes on by the guess           DEGRADED
+///   few features, none:         nothing                                 WAITING, after the first map LOST
+///   a guess, with a map:        the guess; the map stays                DEGRADED
+///   a guess, no map:            the fallback map, at the guess          DEGRADED; by a gyro alone another epoch
+///   no guess, with a map:       nothing; the map stays                  LOST
+///   no guess, no map:           the fallback map, at the last pose      DEGRADED in another epoch; at first TRACKING
 OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures& features, OdometryState& state) {
   state.interrupt();
   const auto guessed = state.outage.guessedMotion();

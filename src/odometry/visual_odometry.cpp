@@ -273,13 +273,13 @@ std::optional<MeasuredPair> VisualOdometry::Impl::measuredPair(const PairSearch&
 std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const PairSearch& pair,
                                                             const std::optional<MeasuredPair>& measured) const {
   const bool continues = pair.kind() == PairSearch::kContinues;
-  // The map is from before the rotation.
+  // A motion between the map, which is from before the rotation, and disparities that are rotated may err.
   std::vector<Evidence> evidence{
       {pair.rotation().log_odds, pair.rotation().words()},
       {pair.rotation().log_odds_of_other_moment, "the right image seemed to be of another moment"}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
   if (continues)
-    evidence.push_back({pair.frozen(), "images as of the previous pair, by a stop or a frozen driver", true});
+    evidence.push_back({pair.logOddsOfFrozen(), "images as of the previous pair, by a stop or a frozen driver", true});
   // After a short gap, the views may not be of one rigid world, and the next map would be as wrong.
   if (continues && !pair.found().motion.success && pair.found().agreement.matches >= kManyMatches &&
       pair.dt() <= options_.tracking.max_gap)
@@ -426,6 +426,7 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjust(const PairSearch& p
   candidate.T_keyframe_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && may_recall) revisit_.recall(features, candidate.calibration, map);
   const std::optional<Floor> floor = this->floor();
+  // The adjustment has one calibration for all pairs, so a delay shifts them by the window's mean rate.
   const auto [T_oldest_newest, seconds] = map.motionOfWindow();
   candidate.calibration_by_rig = RigEstimate::shape(
       features.camera, logSO3(T_oldest_newest.linear()) / state_.prior.interval(seconds, T_oldest_newest));

@@ -49,6 +49,7 @@ CalibrationBelief CalibrationFilter::prior(const RigEstimate::Shape& shape) cons
     belief.mean = shape.leftCols<RigEstimate::kDelay>() * known.mean.head<RigEstimate::kDelay>();
     covariance += shape * known.covariance * shape.transpose();
   }
+  // In the units of the adjustment, whose own information is too large by 1 / kRealInformation.
   belief.information = covariance.inverse() / kRealInformation;
   if (commons_ >= kFewestMeasured) belief.common_sigma = std::sqrt(std::max(common_square_, 0.0));
   return belief;

@@ -14,7 +14,7 @@ namespace {
 /// Covariance of a measured rotation, with errors of rectification.
 Eigen::Matrix3d withRectification(const RightRotation& measured) {
   constexpr double kUsual = 0.2;  // px (rms): healthy rigs (KITTI, EuRoC) have half a pixel at most
-  return measured.covariance + kUsual * kUsual * measured.spread;
+  return measured.covariance + kUsual * kUsual * measured.by_pixel;
 }
 
 /// Log-likelihood ratio that the rotation, for which features are compensated, moved the rows, against a fault of the
@@ -88,25 +88,27 @@ RotationHypothesis LearntRig::rotationHypothesis(const StereoFeatures& features,
 RigEstimate::Matrix LearntRig::rotate(const RotationHypothesis& new_rotation, const StereoCamera& camera) {
   const Eigen::Vector3d now = rotation + new_rotation.value, back = now - rotation_before_;
   const Eigen::Matrix3d covariance = rotation_covariance + new_rotation.covariance;
-  std::swap(rotation, rotation_before_), std::swap(rotation_covariance, covariance_before_);
-  if (back.dot((covariance + rotation_covariance).inverse() * back) < noiseGate(3)) {
-    // The rig is again as before the last rotation: an error of images, no knock.
-    rotation_noise_ += new_rotation.value * new_rotation.value.transpose();
-    rotated_last_ = false;
-    return RigEstimate::Matrix::Zero();
+  rotated_last_ = !(back.dot((covariance + covariance_before_).inverse() * back) < noiseGate(3));
+  if (rotated_last_) {
+    rotation_before_ = std::exchange(rotation, now);
+    covariance_before_ = std::exchange(rotation_covariance, covariance);
+    return calibration.widen(camera, new_rotation.covariance);
   }
-  rotation = now, rotation_covariance = covariance;
-  rotated_last_ = true;
-  return calibration.widen(camera, new_rotation.covariance);
+  // The rig is again as before the last rotation: an error of images, no knock.
+  std::swap(rotation, rotation_before_), std::swap(rotation_covariance, covariance_before_);
+  rotation_noise_ += new_rotation.value * new_rotation.value.transpose();
+  return RigEstimate::Matrix::Zero();
 }
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
                       const RotationHypothesis& new_rotation, bool is_confirmed) {
-  if (!(new_rotation.log_odds > 0.0) && std::exchange(rotated_last_, false) && !measured &&
-      found.agreement.matches >= kFewestMeasured) {
-    const Eigen::Vector3d back = rotation - rotation_before_;
-    rotation_noise_ += back * back.transpose();
-    rotation = rotation_before_, rotation_covariance = covariance_before_;
+  if (!(new_rotation.log_odds > 0.0) && std::exchange(rotated_last_, false)) {
+    // With the rotation of the pair before, many matches agree on no motion: it was an error of images.
+    if (!measured && found.agreement.matches >= kFewestMeasured) {
+      const Eigen::Vector3d back = rotation - rotation_before_;
+      rotation_noise_ += back * back.transpose();
+      rotation = rotation_before_, rotation_covariance = covariance_before_;
+    }
   }
   log_prior_of_other_moment_ = features.report.refused ? kUnsuspected : log_prior_of_other_moment_ - std::log(2.0);
   if (is_confirmed) {

@@ -40,7 +40,8 @@ struct RolledPair {
 /// right ones at the same time.
 ///
 /// Motions between pairs are mean velocities. Under white acceleration of the variance a^2 per second, the velocity at
-/// a pair is the mean before it plus a quarter of the last change of the mean, with the variance 7/24 a^2 dt. Once the
+/// a pair less the mean before it has the variance a^2 dt / 3, the last change of the mean 2/3 a^2 dt, and both the
+/// covariance a^2 dt / 6. So the best estimate is that mean plus a quarter of the change, to 7/24 a^2 dt. Once the
 /// next motion is known, the velocity is the mean of both motions', with the variance a^2 dt / 6.
 /// Rows measure the rate at the pair itself, even in a tremor faster than pairs, but against the map. If pairs of the
 /// map were moved by this rate, its error would grow from pair to pair. So only the newest pair uses it, until the next
