@@ -56,9 +56,9 @@ ExpectedMotion MotionPrior::predicted(double dt) const {
 std::optional<ExpectedMotion> MotionPrior::priorByConfirmed(std::int64_t stamp, double dt) const {
   if (!confirmed_) return std::nullopt;
   const double age = static_cast<double>(stamp - confirmed_stamp_) * 1e-9;
-  const ExpectedMotion expected{
-      expSE3(*confirmed_ * dt), processNoise(longest(dt), longest(confirmed_interval_), age) + stampNoise(*confirmed_) +
-                                    dt * dt * confirmed_covariance_};
+  const ExpectedMotion expected{expSE3(*confirmed_ * dt), processNoise(longest(dt), longest(confirmed_interval_), age) +
+                                                              stampNoise(*confirmed_) +
+                                                              dt * dt * confirmed_covariance_};
   const double error = std::sqrt(expected.covariance.topLeftCorner<3, 3>().trace());
   return error < options_.max_speed * options_.max_gap ? std::optional(expected) : std::nullopt;
 }

@@ -60,9 +60,8 @@ class PoseCovariance {
   /// its covariance in the map exceeds the key frame's. Returns the covariance of the motion between the two reported
   /// poses. After a key frame, this is `since_keyframe`. Otherwise the covariances since the key frame are K + A of the
   /// pose before and K + B of this one, with the noise K of the key frame's own measurement, which cancels in the
-  /// motion: A + B. Key frame and pairs see the same points with like noise: with K as the smaller of A and B, A + B is the
-  /// larger of both covariances.
-  /// Predictions and doubts of the previous pose are added.
+  /// motion: A + B. Key frame and pairs see the same points with like noise: with K as the smaller of A and B, A + B is
+  /// the larger of both covariances. Predictions and doubts of the previous pose are added.
   Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
   /// The same in a map of one key frame.
   Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {

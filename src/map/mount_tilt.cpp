@@ -5,11 +5,12 @@
 #include <cmath>
 
 namespace sdvo {
-
 namespace {
 
-constexpr double kLeast = 0.1, kNoise = 0.01;  // of the height's standard deviation: less way is noise, at least
-constexpr double kLeastTurn = 1e-3, kNoiseTurn = 1e-4;  // rad (chosen)
+// Shorter ways and smaller turns of a pair are left out: ratio of the height's standard deviation, and rad (chosen).
+constexpr double kLeast = 0.1, kLeastTurn = 1e-3;
+// Least standard deviations of a way's height and of a turn, the same (chosen).
+constexpr double kNoise = 0.01, kNoiseTurn = 1e-4;
 
 }  // namespace
 
@@ -53,7 +54,8 @@ MountTilt::Estimate MountTilt::solve(const Eigen::Matrix2d& information, const E
   for (int pass = 1; pass <= kPasses; ++pass) {
     const double of_translations = std::max(translations_.variance(found.normal), least * least);
     const double of_rotations = std::max(rotations_.variance(found.normal), kNoiseTurn * kNoiseTurn);
-    // Weights are those of motions around their own normal: a prior that they contradict would make them noise.
+    // The first passes find the noise of the motions around their own normal, all but without a prior (1 rad): around
+    // that of a prior which they contradict, they would have none of the weight.
     const bool is_last = pass == kPasses;
     found.covariance = (translations_.square / of_translations + rotations_.square / of_rotations +
                         (is_last ? information : Eigen::Matrix2d::Identity()))

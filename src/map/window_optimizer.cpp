@@ -241,8 +241,8 @@ class WindowOptimizer::Solver {
   };
   /// An observation with the weight w = 1 / (1 + s) adds w times a product of Jacobians to the normal equations. The
   /// second derivative of its cost is 2 w^2 - w along the residual of the square s, and w across it: w^2 on average of
-  /// the image's two directions. Gradients are w times the residual, so the meat has w^2, too; the residuals' own size is
-  /// that of meatOverBread(), before and now. The elimination of the point leaves w_i - w_i^2 / sum(w) of each. The
+  /// the image's two directions. Gradients are w times the residual, so the meat has w^2, too; the residuals' own size
+  /// is that of meatOverBread(), before and now. The elimination of the point leaves w_i - w_i^2 / sum(w) of each. The
   /// factors are ratios of the sums of these.
   SandwichScale sandwichScale() const {
     double weights = 0.0, before = 0.0, now = 0.0;
@@ -324,7 +324,8 @@ class WindowOptimizer::Solver {
     LogSum costs;
     for (const double square : squares) costs.add(square / kernelSquare());
     const RigCalibration::Vector error = estimate.calibration.value - window_->calibration_prior.mean;
-    return error.dot(window_->calibration_prior.information * error) + kernelSquare() * costs.value() + floorCost(estimate);
+    return error.dot(window_->calibration_prior.information * error) + kernelSquare() * costs.value() +
+           floorCost(estimate);
   }
 
   double floorCost(const Estimate& estimate) const {

@@ -67,8 +67,8 @@ bool PairSearch::movesFeatures(const StereoCamera& before) const {
   return false;
 }
 
-/// Of the motion that is found, by its inliers' aligned positions, up to a constant: half of each square, up to the gate,
-/// which is what a wrong match costs. All counts half, for the map's points err as much as the pair's.
+/// Of the motion that is found, by its inliers' aligned positions, up to a constant: half of each square, up to the
+/// gate, which is what a wrong match costs. All counts half, for the map's points err as much as the pair's.
 double PairSearch::logLikelihood() const {
   const StereoCamera& camera = features().camera;
   const NoiseOptions& noise = options_.noise;

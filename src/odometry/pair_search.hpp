@@ -34,8 +34,8 @@ class PairSearch {
   PairSearch& operator=(const PairSearch&) = delete;
 
   // The features on their way, each without the error before it, where there is one:
-  // given -> whole(), in the map's pixels -> part(), without repeated rows -> taken(), rotated back -> inStep(), left and
-  // right at one moment -> features(), all rows at one moment.
+  // given -> whole(), in the map's pixels -> part(), without repeated rows -> taken(), rotated back -> inStep(), left
+  // and right at one moment -> features(), all rows at one moment.
 
   enum Kind {
     kNoMap,        ///< no map of its camera: it begins one
@@ -45,7 +45,7 @@ class PairSearch {
   };
   Kind kind() const { return kind_; }
 
-  double dt() const { return dt_; }          ///< since the previous pair, s
+  double dt() const { return dt_; }  ///< since the previous pair, s
   /// That its images repeat although the camera moved.
   double logOddsOfFrozen() const { return log_odds_of_frozen_; }
 

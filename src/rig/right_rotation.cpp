@@ -197,7 +197,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
   const UnknownsMatrix inverse = equations.hessian.inverse();
   found.covariance = equations.sandwich(inverse);
   found.by_pixel = static_cast<double>(inliers.size()) / (3.0 * disparity_sigma * disparity_sigma) *
-                 inverse.bottomRightCorner<3, 3>();
+                   inverse.bottomRightCorner<3, 3>();
   return found;
 }
 

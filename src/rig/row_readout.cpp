@@ -45,14 +45,12 @@ double studentRatio(double pairs) {
 
 }  // namespace
 
-/// Matched features, with the same points' positions in the previous pair. More than kMost would not make the readout
-/// more precise, because the rates err more than the positions.
-std::vector<RowReadout::Track> RowReadout::tracksOf(const StereoFeatures& features,
-                                                    const MotionHypothesis& found) const {
-  constexpr std::size_t kMost = 256;  // (chosen)
+/// Matched features, with the same points' positions in the previous pair; some of them.
+std::vector<RowReadout::Track> RowReadout::tracksOf(const StereoFeatures& features, const MotionHypothesis& found,
+                                                    std::size_t most) const {
   std::vector<Track> tracks;
   if (last_positions_.empty()) return tracks;
-  const std::size_t step = 1 + found.matches.size() / kMost;
+  const std::size_t step = 1 + found.matches.size() / most;
   for (std::size_t i = 0; i < found.matches.size(); i += step) {
     const FeatureMatch& match = found.matches[i];
     const int before = found.view->newest[match.reference];
@@ -66,9 +64,11 @@ std::vector<RowReadout::Track> RowReadout::tracksOf(const StereoFeatures& featur
 
 void RowReadout::add(const StereoFeatures& features, const MotionHypothesis& found, double dt) {
   constexpr double kSteady = 0.3;  // ratio (chosen) by which intervals may differ
+  // More tracks (chosen) would not make the readout more precise, because the rates err more than the positions.
+  constexpr std::size_t kMost = 256;
   if (!pairs_.empty() && !(std::abs(dt - pairs_.back().dt) < kSteady * pairs_.back().dt)) pairs_.clear();
   const Eigen::Isometry3d& T = found.motion.T_current_reference;
-  pairs_.push_back({features.camera, tracksOf(features, found), T, dt, logSO3(T.linear().transpose()) / dt});
+  pairs_.push_back({features.camera, tracksOf(features, found, kMost), T, dt, logSO3(T.linear().transpose()) / dt});
   last_positions_.clear();
   for (int i = 0; i < features.count(); ++i) last_positions_.emplace_back(features.u[i], features.v[i]);
   if (pairs_.size() <= 2 * kAround) return;
@@ -172,7 +172,8 @@ Matrix6d RowReadout::momentOf(const StereoFeatures& features, const MotionHypoth
   // As RollingShutter::velocityAt() and velocityBetween().
   const Eigen::Vector3d rate = logSO3(T.linear().transpose()) / dt, rate_before = pairs_.back().rate;
   const Rates rates = {0.5 * (rate_before + rate), rate + 0.25 * (rate - rate_before)};
-  const std::vector<Track> tracks = tracksOf(features, found);
+  constexpr std::size_t kMost = 64;  // (chosen) for a derivative
+  const std::vector<Track> tracks = tracksOf(features, found, kMost);
   if (static_cast<int>(tracks.size()) < kFewestMeasured) return Matrix6d::Zero();
   Matrix6d information = Matrix6d::Zero();
   Vector6d product = Vector6d::Zero();

@@ -58,7 +58,7 @@ class RowReadout {
     double dt;             ///< since the pair before, s
     Eigen::Vector3d rate;  ///< mean since the pair before, rad/s about the camera's axes
   };
-  std::vector<Track> tracksOf(const StereoFeatures& features, const MotionHypothesis& found) const;
+  std::vector<Track> tracksOf(const StereoFeatures& features, const MotionHypothesis& found, std::size_t most) const;
   void measure();
   double squareAround(double compensated) const;
   bool isCompensated() const;
