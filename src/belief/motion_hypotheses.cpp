@@ -278,8 +278,8 @@ PlaceBelief choosePlace(const FoundPlace& place, const std::vector<ExpectedMotio
   if (place.alike)
     belief.mixture.add({logWeight(other) - logWeight(chosen), momentOf(logSE3(chosen * other.inverse())),
                         "other places of the map look alike"});
-  // Or the map matched by chance, and the camera moved as one of the priors says, though it is in no known place. The
-  // priors were asked for a place: that they alone are right has the probability of a tail.
+  // Or the map matched by chance, and the camera moved as one of the priors says. After an outage these are weak: they
+  // have the weight that logWeight() gives to what contradicts them.
   const double by_chance = kTailProbability * place.chance;
   for (const ExpectedMotion& expected : prior)
     belief.mixture.add({std::log(by_chance) - logWeight(chosen),

@@ -79,12 +79,12 @@ std::array<cv::Mat, 2> MosaicCheck::add(const cv::Mat& left, const cv::Mat& righ
 std::string MosaicCheck::problem() const {
   const bool is_left = left_ > kMosaicShare, is_right = right_ > kMosaicShare;
   if (!is_left && !is_right) return "";
-  return std::string(is_left && is_right ? "both images are"
-                     : is_left           ? "the left image is"
-                                         : "the right image is") +
-         " a colour sensor's Bayer mosaic (a period of two pixels) under the name of a grey image, smoothed, which "
-         "costs "
-         "sharpness: let the driver name it (bayer_rggb8, …) and start stereo_raw.launch, which converts it";
+  const std::string which = is_left && is_right ? "both images are"
+                            : is_left           ? "the left image is"
+                                                : "the right image is";
+  return which +
+         " a colour sensor's Bayer mosaic (a period of two pixels) under the name of a grey image, and smoothed, which "
+         "costs sharpness: let the driver name it (bayer_rggb8, …) and start stereo_raw.launch, which converts it";
 }
 
 Finding MosaicCheck::judge() const {
