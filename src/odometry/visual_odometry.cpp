@@ -277,7 +277,7 @@ std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const PairSearch& pa
   std::vector<Evidence> evidence{
       {pair.rotation().log_odds, pair.rotation().words()},
       {pair.rotation().log_odds_of_other_moment, "the right image seemed to be of another moment"}};
-  if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
+  if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together", true});
   if (continues)
     evidence.push_back({pair.logOddsOfFrozen(), "images as of the previous pair, by a stop or a frozen driver", true});
   // After a short gap, the views may not be of one rigid world, and the next map would be as wrong.

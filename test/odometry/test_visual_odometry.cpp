@@ -67,6 +67,11 @@ StereoFeatures blindPair(int i) {
   return synthetic::noFeatures(synthetic::camera(), stampOf(i));
 }
 
+StereoFeatures refused(StereoFeatures features) {
+  features.report.refused = true;
+  return features;
+}
+
 /// Pair i in which everything is new, as after a jump to another place.
 StereoFeatures strangePair(int i) {
   const auto seed = static_cast<unsigned>(i);
@@ -192,6 +197,7 @@ struct Drive {
                         : kind == 'b' ? blindPair(next)
                         : kind == 's' ? strangePair(next)
                         : kind == 'e' ? pairElsewhere(next)
+                        : kind == 'r' ? refused(blindPair(next))
                                       : coveredPair(next);
       last = odometry.update(pair, guess ? std::optional(guess(next)) : std::nullopt);
       SCOPED_TRACE("pair " + std::to_string(next) + " of " + pairs + ": " + last.reason);
@@ -440,6 +446,16 @@ TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
     EXPECT_LT(distanceBetween(drive.last.T_origin_camera, begun * trueSinceStart(i, 10)), 1e-3);
     EXPECT_GE(drive.last.pose_covariance.trace(), again.pose_covariance.trace());
   }
+}
+
+/// Left and right of its pairs may be of two moments, as those before were.
+TEST(VisualOdometry, AMapThatBeginsAfterRefusedPairsIsDoubtful) {
+  Drive drive;
+  ASSERT_EQ(drive("gggggg b rrr ee"), "TTTTTT D LLL LD");
+  EXPECT_EQ(drive("e"), "D") << drive.last.reason;
+  EXPECT_TRUE(contains(drive.last.reason, "did not belong together")) << drive.last.reason;
+  EXPECT_EQ(drive("eeeee").back(), 'T') << drive.last.reason;
+  EXPECT_EQ(Drive()("gggggg rr ggg").back(), 'T') << "lasting points refute it";
 }
 
 /// Foreign images that agree with each other are a place of their own; the map from before is not lost by them.
