@@ -55,6 +55,7 @@ Matrix6d Outage::growth(const MotionPrior& prior, double dt) const {
 void Outage::end() {
   distance_ = angle_ = seconds_ = 0.0;
   predicted_pairs_ = 0;
+  has_refused_ = false;
 }
 
 }  // namespace sdvo

@@ -34,6 +34,10 @@ class Outage {
   int predictedPairs() const { return predicted_pairs_; }
   void countPrediction() { ++predicted_pairs_; }
 
+  /// Left and right of a pair did not belong together.
+  void noteRefused() { has_refused_ = true; }
+  bool hasRefused() const { return has_refused_; }
+
   /// The pair has a pose, and guessedMotion() begins there.
   void havePose() { guessed_motion_ = GuessedMotion(); }
   /// The pair's motion is measured.
@@ -46,6 +50,7 @@ class Outage {
   double distance_ = 0.0, angle_ = 0.0;  ///< sums over the outage's guesses, m and rad
   double seconds_ = 0.0;
   int predicted_pairs_ = 0;
+  bool has_refused_ = false;
 };
 
 }  // namespace sdvo

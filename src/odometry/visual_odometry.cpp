@@ -277,7 +277,10 @@ std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const PairSearch& pa
   std::vector<Evidence> evidence{
       {pair.rotation().log_odds, pair.rotation().words()},
       {pair.rotation().log_odds_of_other_moment, "the right image seemed to be of another moment"}};
-  if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together", true});
+  if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
+  // Those of a map that begins after such pairs may be of two moments, too; in a map from before they could not be.
+  if (state_.outage.hasRefused() && pair.scene() && state_.fallback_map && &pair.scene()->map == &*state_.fallback_map)
+    evidence.push_back({kCertain, "left and right of pairs before it did not belong together", true});
   if (continues)
     evidence.push_back({pair.logOddsOfFrozen(), "images as of the previous pair, by a stop or a frozen driver", true});
   // After a short gap, the views may not be of one rigid world, and the next map would be as wrong.
@@ -304,6 +307,7 @@ void VisualOdometry::Impl::begin(const PairSearch& pair, const std::optional<Mot
   ++state_.pairs;
   if (pair.dt() <= options_.tracking.max_gap) state_.prior.noteInterval(pair.dt());
   state_.outage.extend(pair.dt(), guess, state_.prior);
+  if (features.report.refused) state_.outage.noteRefused();
   const RigEstimate before = state_.rig.calibration.estimate();
   // A clock's jump ages no rig.
   RigEstimate::Matrix step = state_.rig.calibration.predict(std::min(pair.dt(), options_.tracking.max_gap));
