@@ -100,7 +100,8 @@ class RenderedDrive(unittest.TestCase):
         planar = [matrix_of(message.pose.pose) for message in self.planar]
         for pose, message in zip(planar, self.planar):
             self.assertLess(abs(pose[2, 3]), 0.01, 'height at %s' % message.header.stamp)
-            self.assertLessEqual(message.pose.covariance[14], 3 * 0.01 ** 2)  # of the floor, of the mount by it, and its mean
+            # Of the floor, and of the mount's tilt by the motions, which its own height then confirms.
+            self.assertLess(np.sqrt(message.pose.covariance[14]), 0.03)
 
         def largest_error(poses):
             return max(np.linalg.norm(pose[:2, 3] - true[:2, 3]) for pose, true in zip(poses, self.true))
