@@ -78,7 +78,7 @@ bool isObject(const Points& points, const Points& others) {
 
 /// Whether a row of the image separates points from others, as in a torn or damaged image. Their numbers do not imply
 /// which part shows the camera's motion. If points fall on either side by chance, with the ratios p and q of all n, one
-/// division has a probability of p^(p n) q^(q n), which is less than max(p, q)^n.
+/// division has a probability of p^(p n) q^(q n), which is at most max(p, q)^n.
 bool areDivided(const Points& points, const Points& others) {
   constexpr double kWrongInliers = 0.1;  // of either side (chosen): some wrong matches agree by chance
   const auto rowsOf = [](const Points& pixels) {
@@ -278,8 +278,8 @@ PlaceBelief choosePlace(const FoundPlace& place, const std::vector<ExpectedMotio
   if (place.alike)
     belief.mixture.add({logWeight(other) - logWeight(chosen), momentOf(logSE3(chosen * other.inverse())),
                         "other places of the map look alike"});
-  // Or the map matched by chance, and the camera moved as one of the priors says. After an outage these are weak: they
-  // have the weight that logWeight() gives to what contradicts them.
+  // Or the map matched by chance, and the camera moved as one of the priors says. A prior alone has the weight of a
+  // place that contradicts it.
   const double by_chance = kTailProbability * place.chance;
   for (const ExpectedMotion& expected : prior)
     belief.mixture.add({std::log(by_chance) - logWeight(chosen),

@@ -54,8 +54,8 @@ MountTilt::Estimate MountTilt::solve(const Eigen::Matrix2d& information, const E
   for (int pass = 1; pass <= kPasses; ++pass) {
     const double of_translations = std::max(translations_.variance(found.normal), least * least);
     const double of_rotations = std::max(rotations_.variance(found.normal), kNoiseTurn * kNoiseTurn);
-    // The first passes find the noise of the motions around their own normal, all but without a prior (1 rad): around
-    // that of a prior which they contradict, they would have none of the weight.
+    // The first passes measure the motions' noise around their own normal, with a prior of 1 rad. Around a tight prior
+    // that they contradict, their noise would seem large and their weight would vanish.
     const bool is_last = pass == kPasses;
     found.covariance = (translations_.square / of_translations + rotations_.square / of_rotations +
                         (is_last ? information : Eigen::Matrix2d::Identity()))

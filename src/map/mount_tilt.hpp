@@ -25,9 +25,9 @@ class MountTilt {
   /// `sigma`: rad, of each tilt as the mount is trusted beforehand.
   Estimate estimate(double sigma) const;
 
-  /// What the mount's error adds to the covariance of a pose (of a right perturbation of T_origin_camera): the first
-  /// pose of the base is not level but tilted, and the way with it. The second moment of what is known of the tilt, by
-  /// the pose itself, too, where it is on the first one's floor.
+  /// Covariance of a pose (of a right perturbation of T_origin_camera) by the mount's error alone. With it the base's
+  /// first pose is tilted, and the way with it. This is the second moment of the tilt by the motions and, where the
+  /// pose is on the first one's floor, by its height.
   Matrix6d ofPose(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_origin_camera,
                   bool is_on_floor) const;
 

@@ -278,7 +278,7 @@ std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const PairSearch& pa
       {pair.rotation().log_odds, pair.rotation().words()},
       {pair.rotation().log_odds_of_other_moment, "the right image seemed to be of another moment"}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
-  // Those of a map that begins after such pairs may be of two moments, too; in a map from before they could not be.
+  // A map that begins after such a pair may have a late right image, too: nothing else has shown its disparities.
   if (state_.outage.hasRefused() && pair.scene() && state_.fallback_map && &pair.scene()->map == &*state_.fallback_map)
     evidence.push_back({kCertain, "left and right of pairs before it did not belong together", true});
   if (continues)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "../motion/noise.hpp"
 #include "../motion/pose_problem.hpp"
@@ -155,8 +156,11 @@ std::optional<RowReadout::Estimate> RowReadout::estimate() const {
 double RowReadout::squareAround(double compensated) const {
   constexpr double kRolling = 0.5, kReadout = 0.02;  // chosen: ratio of cameras; s, usual ones have 5 to 30 ms
   using Scalar = Eigen::Matrix<double, 1, 1>;
+  constexpr double kExact = 1e-6;  // s (chosen): points of a simulator have no noise, and the sigma may be zero
   const auto known = estimate();
-  const double value = known ? known->value : 0.0, information = known ? 1.0 / (known->sigma * known->sigma) : 0.0;
+  const double value = known ? known->value : 0.0;
+  const double sigma = known ? std::max(known->sigma, kExact) : std::numeric_limits<double>::infinity();
+  const double information = 1.0 / (sigma * sigma);
   const double rolling = probabilityOf(
       logOdds(kRolling) + logBayesFactor<1>(Scalar(value), Scalar(information), Scalar(kReadout * kReadout)));
   const double variance = 1.0 / (information + 1.0 / (kReadout * kReadout));

@@ -39,8 +39,8 @@ class RowReadout {
 
   std::optional<Estimate> estimate() const;
 
-  /// What the unknown readout adds to the covariance of a pair's motion: its second moment around `compensated`, s.
-  /// Call it before add() of the same pair.
+  /// Covariance of a pair's motion by the unknown readout alone: its second moment around `compensated`, s, carried to
+  /// the motion. Call it before add() of the same pair.
   Matrix6d momentOf(const StereoFeatures& features, const MotionHypothesis& found, double dt, double compensated) const;
   /// The estimate, s, from when the shutter was certainly rolling and the standard deviation below kWarn; else 0.
   double usableValue() const { return is_compensated_ ? product_ / information_ : 0.0; }
