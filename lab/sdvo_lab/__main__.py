@@ -14,6 +14,7 @@ COMMANDS = {
     "places": ("places", "recognised revisits and false loops of long drives"),
     "self-check": ("self_check", "the self-checks of run_sequence against the ground truth"),
     "experiments": ("experiments", "the paper's experiments"),
+    "learn": ("learn", "FREAK's bit pairs and size curves, on rendered drives alone"),
     "tables": ("tables", "tables of the paper's experiments from their CSV files"),
     "figures": ("figures", "tables of the pages, made anew where the odometry is another one"),
     "golden": ("golden", "poses, states and covariances of two builds"),
