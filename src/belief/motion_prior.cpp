@@ -118,7 +118,7 @@ std::string MotionPrior::tooFast(const Eigen::Isometry3d& motion, const Matrix6d
   if (!(distance <= options_.max_speed * time + noise(0)))
     words << "a speed of " << distance / dt << " m/s exceeds tracking/max_speed";
   else if (!(angle <= options_.max_rotation_rate * time + noise(3)))
-    words << "a rotation of " << angle / dt << " rad/s exceeds tracking/max_rotation_rate";
+    words << "a rotation of " << angle / dt << " rad/s exceeds " << options_.max_rotation_rate << " rad/s";
   return words.str();
 }
 

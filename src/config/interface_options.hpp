@@ -50,7 +50,7 @@ struct StereoInputOptions {
   double max_rate = 0.0;
   bool find_camera = true;
   int opencv_threads = -1;
-  double max_silence = 2.0;
+  double max_silence = 2.0;  ///< s of wall time without a pair, which /diagnostics call an error (chosen)
   RateOptions rates;
   ImageThresholds thresholds;
 
@@ -65,8 +65,6 @@ struct StereoInputOptions {
              "namespace / only where it is set");
     list.add("opencv_threads", opencv_threads, {-1, 256}, "",
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
-    list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
-             "/diagnostics report an error when no pair has come for longer (wall time)");
     list.add("diagnostics/max_unused", rates.max_unused, {0.0, 1.0}, "ratio",
              "/diagnostics and the log warn when more of the last seconds' input is not used");
   }
@@ -80,11 +78,9 @@ struct OdometryOutputOptions {
   bool publish_tf = true;
   bool invert_tf = false;
   bool publish_null_when_lost = false;
-  double tf_timeout = 2.0;
   std::string guess_frame_id;
   bool use_imu = false;
   double guess_timeout = 0.1;
-  double guess_error = 0.1;
   double guess_min_translation = 0.0;
   double guess_min_rotation = 0.0;
   double guess_min_time = 0.0;
@@ -92,7 +88,7 @@ struct OdometryOutputOptions {
   std::string ground_truth_base_frame_id;
   int queue_size = 1;
   bool overwrite = false;
-  double max_silence = 2.0;
+  double max_silence = 2.0;  ///< s of wall time without features, which /diagnostics call an error (chosen)
   RateOptions rates;
   double max_load = 0.9;     ///< of one processor: /diagnostics warn beyond it (chosen)
   double max_latency = 0.5;  ///< s, of poses after their images (chosen)
@@ -120,8 +116,6 @@ struct OdometryOutputOptions {
     list.add("invert_tf", invert_tf, "publish base -> odom instead, where base already has a parent");
     list.add("publish_null_when_lost", publish_null_when_lost,
              "while LOST publish odometry of zeros, quaternion included, with variances of 9999, as rtabmap does");
-    list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",
-             "wall time to wait for the transform base <- camera at the start");
     list.add("guess_frame_id", guess_frame_id,
              "world-fixed frame of another odometry: where its guess_frame_id -> base on TF has the base is one more "
              "place to look for the motion; empty: none");
@@ -129,9 +123,6 @@ struct OdometryOutputOptions {
              "look for the rotation where the gyro of topic imu has it, too, and take roll and pitch of the first pose "
              "from its "
              "accelerometer while the robot stands; not with guess_frame_id");
-    list.add("guess_error", guess_error, {0.001, 1.0}, "ratio",
-             "standard deviation of the guess's motions, of their distance and turn: the pose goes on by them while no "
-             "images help");
     list.add(
         "guess_min_translation", guess_min_translation, {0.0, 10.0}, "m",
         "by guess_frame_id: pairs are left out until the base has moved so far since the last one that was not, or "
@@ -149,8 +140,6 @@ struct OdometryOutputOptions {
     list.add("queue_size", queue_size, {1, 1000}, "",
              "feature messages that wait while one is processed; the newest win");
     list.add("overwrite", overwrite, "save_trajectory may replace files that were there before");
-    list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
-             "/diagnostics report an error when no pair has come for longer (wall time)");
   }
 };
 

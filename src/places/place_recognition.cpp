@@ -115,11 +115,12 @@ void PlaceRecognition::forget(int id) {
 
 /// Whether the last pair becomes a key frame: it is far enough from the last one and has enough features.
 bool PlaceRecognition::isKeyframe(const StereoFeatures& features) const {
+  constexpr double kTurn = 15.0 * CV_PI / 180.0;  // rad (chosen): most of the view is the last one's
   if (features.count() < PlaceVerifier::kLeastInliers) return false;
   if (!last_ || !way_.known) return true;
   const Eigen::Isometry3d T_keyframe_camera = places_.at(*last_).T_odom_camera.inverse() * *way_.T_odom_camera;
   return T_keyframe_camera.translation().norm() >= options_.keyframe_distance ||
-         Eigen::AngleAxisd(T_keyframe_camera.linear()).angle() >= options_.keyframe_angle * CV_PI / 180.0;
+         Eigen::AngleAxisd(T_keyframe_camera.linear()).angle() >= kTurn;
 }
 
 void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {

@@ -162,7 +162,7 @@ TEST(MotionPrior, NoiseAndStampsMayExceedTheLargestSpeed) {
   EXPECT_EQ(prior.tooFast(ahead(7.0), Matrix6d::Zero(), 0.1), "");
   EXPECT_TRUE(contains(prior.tooFast(ahead(12.0), Matrix6d::Zero(), 0.1), "max_speed"));
   EXPECT_EQ(prior.tooFast(ahead(12.0), Matrix6d::Identity(), 0.1), "");
-  EXPECT_TRUE(contains(prior.tooFast(ahead(0.0, 1.2), Matrix6d::Zero(), 0.1), "max_rotation_rate"));
+  EXPECT_TRUE(contains(prior.tooFast(ahead(0.0, 1.2), Matrix6d::Zero(), 0.1), "rad/s exceeds 6.3 rad/s"));
   EXPECT_EQ(prior.tooFast(ahead(0.01, 0.01), Matrix6d::Zero(), 0.001), "") << "stamps of a burst";
 }
 

@@ -44,7 +44,7 @@ class Faults(PipelineCase):
     def test_a_driver_that_restarts_keeps_pose_and_places(self):
         """Its stamps begin again near zero while the system's clock goes on, and a map is loaded."""
         file = os.path.join(self.folder(), 'map.bag')
-        config = self.config('place_recognition: {keyframe_distance: 0.1, keyframe_angle: 5.0}\n')
+        config = self.config('place_recognition: {keyframe_distance: 0.1}\n')
         self.start(config=config, loop_closing='true', queue_size=5)
         places = self.listen('place_info', PlaceInfo)
         for i in range(30):
@@ -164,7 +164,7 @@ class Faults(PipelineCase):
 
     def test_a_map_that_was_loaded_is_shown_before_the_first_pair(self):
         file = os.path.join(self.folder(), 'map.bag')
-        config = self.config('place_recognition: {keyframe_distance: 0.1, keyframe_angle: 5.0}\n')
+        config = self.config('place_recognition: {keyframe_distance: 0.1}\n')
         self.start(config=config, loop_closing='true')
         for i in range(12):
             self.feed(i)
@@ -199,7 +199,7 @@ class Faults(PipelineCase):
 
     def test_diagnostics_name_the_cause(self):
         ok, warn, error = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
-        self.start(config=self.config('{stereo_features: {max_silence: 3.0}, visual_odometry: {max_silence: 3.0}}\n'))
+        self.start()
         self.expect('stereo_features', 'input rate', warn, 'no pairs yet on', 'left/image_rect')
         self.expect('visual_odometry', 'input rate', warn, 'no features yet on')
         self.expect('stereo_features', 'input rate', error, 'no pairs yet on')
@@ -263,8 +263,7 @@ class Faults(PipelineCase):
         self.assertGreater(self.features[-1].dropped_pairs, 10)
 
     def test_a_long_wait_for_tf_blocks_nothing(self):
-        self.start(config=self.config('visual_odometry: {tf_timeout: 60.0}\n'))
-        begin = time.time()
+        self.start()
         for i in range(5):
             self.camera.publish(*self.camera.messages(i, frame='mast'))
             self.until(lambda: len(self.features) == i + 1)
@@ -272,13 +271,12 @@ class Faults(PipelineCase):
         self.until(lambda: len(self.info) >= 2)
         self.assertIn("'mast'", self.info[0].reason)
         self.call('visual_odometry/reset', Empty)
-        self.assertLess(time.time() - begin, 50.0, 'it waited for TF')
         self.broadcaster.sendTransform([camera_transform(FRAME), camera_transform('mast')])
         times = itertools.count(5)
         self.until(lambda: self.is_answered(5, time_of=next(times), frame='mast') and self.info[-1].state == 'TRACKING')
 
     def test_a_dark_pair_and_a_careless_click_leave_the_map_alone(self):
-        self.start(config=self.config('place_recognition: {keyframe_distance: 0.1, keyframe_angle: 5.0}\n'), loop_closing='true')
+        self.start(config=self.config('place_recognition: {keyframe_distance: 0.1}\n'), loop_closing='true')
         places = self.listen('place_info', PlaceInfo)
         for i in range(10):
             self.feed(i)
@@ -401,7 +399,7 @@ class Faults(PipelineCase):
 
     def test_a_map_is_only_localised_in_and_a_pose_is_a_hint(self):
         file = os.path.join(self.folder(), 'map.bag')
-        small = '{keyframe_distance: 0.1, keyframe_angle: 5.0%s}\n'
+        small = '{keyframe_distance: 0.1%s}\n'
         self.start(config=self.config('place_recognition: ' + small % ''), loop_closing='true')
         for i in range(40):
             self.feed(i)

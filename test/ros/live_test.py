@@ -527,7 +527,7 @@ class Live(PipelineCase):
             self.assertGreater(info.features, 300)
 
     def test_diagnostics_tell_state_latency_and_silence(self):
-        self.start(config=self.config('visual_odometry: {max_silence: 3.0}\n'))
+        self.start()
         self.until(lambda: 'no features yet' in self.diagnosis().message)
 
         def values():

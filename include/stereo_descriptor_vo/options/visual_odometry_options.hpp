@@ -145,7 +145,7 @@ struct CalibrationOptions {
 
 struct MotionPriorOptions {
   double max_speed = 70.0;
-  double max_rotation_rate = 6.3;
+  double max_rotation_rate = 6.3;  ///< rad/s, one turn a second: a faster rotation is a wrong one (chosen)
   double acceleration = 2.2;
   double rotation_acceleration = 1.4;  ///< rad/s, of the rate of rotation within a second, as acceleration
   double stamp_sigma = 0.005;          ///< s, of a stamp's error (chosen)
@@ -153,7 +153,6 @@ struct MotionPriorOptions {
 
   void describe(OptionList& list) {
     list.add("max_speed", max_speed, {0.1, 1000.0}, "m/s", "a faster motion is a wrong one");
-    list.add("max_rotation_rate", max_rotation_rate, {0.1, 100.0}, "rad/s", "a faster rotation is a wrong one");
     list.add("acceleration", acceleration, {0.01, 1000.0}, "m/s",
              "standard deviation, in each direction, of the velocity's change within a second: white acceleration, so "
              "half of it in a quarter of the time");

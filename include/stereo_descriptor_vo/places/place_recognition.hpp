@@ -19,7 +19,6 @@ namespace sdvo {
 
 struct PlaceRecognitionOptions {
   double keyframe_distance = 3.0;
-  double keyframe_angle = 15.0;
   int max_features = 500;  ///< kept of a key frame (chosen)
   int max_places = 10000;
   double min_age = 20.0;     ///< s: younger key frames are no candidates, unless there was a break since (chosen)
@@ -29,8 +28,7 @@ struct PlaceRecognitionOptions {
 
   void describe(OptionList& list) {
     list.add("keyframe_distance", keyframe_distance, {0.01, 100.0}, "m",
-             "a pair is kept as a key frame after so long a way");
-    list.add("keyframe_angle", keyframe_angle, {0.5, 180.0}, "deg", "… or after such a turn");
+             "a pair is kept as a key frame after so long a way, or a turn of 15 degrees");
     list.add("max_places", max_places, {10, 1000000}, "", "key frames kept; the oldest goes");
     list.add("localisation_only", localisation_only,
              "a map that was loaded stays as it is: no places are added, none is moved");

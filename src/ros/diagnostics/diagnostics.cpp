@@ -13,11 +13,14 @@ namespace {
 
 constexpr const char* kNoPairs = "no pairs";  // the task "input rate" has the reason
 
-/// The image side's max_rate lowers the expected rate, with a tolerance of a tenth as in RateOptions.
-RateOptions expectedRates(const ros::NodeHandle& nh, RateOptions rates) {
+/// With the rate and silence that the image side's max_rate leads to; the rate with a tolerance of a tenth, as in
+/// RateOptions.
+OdometryOutputOptions expected(const ros::NodeHandle& nh, OdometryOutputOptions options) {
   const double limit = nh.param("stereo_features/max_rate", 0.0);
-  if (limit > 0.0) rates.min_rate = std::min(rates.min_rate, 0.9 * limit);
-  return rates;
+  if (limit <= 0.0) return options;
+  options.rates.min_rate = std::min(options.rates.min_rate, 0.9 * limit);
+  options.max_silence = std::max(options.max_silence, 2.0 / limit);
+  return options;
 }
 
 }  // namespace
@@ -89,7 +92,8 @@ Findings ImageDiagnostics::judgeFeatures(Values& values) {
   if (!failure.empty()) return {{Verdict::kFail, failure}};
   if (refusals.refused() > 0) return {refusals.judge(0.0)};
   if (last_)
-    if (const Finding few = checkCorners(last_->detected, thresholds_.min_corners); few.isFault()) return {few.asWarning()};
+    if (const Finding few = checkCorners(last_->detected, thresholds_.min_corners); few.isFault())
+      return {few.asWarning()};
   if (last_ && !last_->status.empty()) return {{Verdict::kWarn, last_->status}};
   return {{Verdict::kOk, text(0, last_count_, " features")}};
 }
@@ -98,7 +102,8 @@ OdometryDiagnostics::OdometryDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& p
                                          const OdometryOutputOptions& options, UnusedInput& unused)
     : max_latency_(options.max_latency),
       unused_(unused),
-      input_("features", nh.resolveName("stereo_features"), options.max_silence, expectedRates(nh, options.rates)),
+      input_("features", nh.resolveName("stereo_features"), expected(nh, options).max_silence,
+             expected(nh, options).rates),
       load_(options.max_load),
       updater_(nh, private_nh, name) {
   updater_.add("odometry", this, &OdometryDiagnostics::judge);
@@ -154,8 +159,9 @@ void OdometryDiagnostics::addValues(Values& values) const {
   if (std::isfinite(last_->readout))
     values.add("readout [ms]", text(2, 1e3 * last_->readout, " +- ", 1e3 * last_->readout_sigma));
   if (std::isfinite(last_->right_rotation[0]))
-    values.add("right camera rotation [mrad]", text(2, 1e3 * last_->right_rotation[0], " ", 1e3 * last_->right_rotation[1],
-                                                    " ", 1e3 * last_->right_rotation[2]));
+    values.add("right camera rotation [mrad]",
+               text(2, 1e3 * last_->right_rotation[0], " ", 1e3 * last_->right_rotation[1], " ",
+                    1e3 * last_->right_rotation[2]));
   values.add("latency [s]", last_->latency);
   values.add("dropped pairs", last_->dropped_pairs);
 }

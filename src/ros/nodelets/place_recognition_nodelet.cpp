@@ -79,7 +79,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     const std::uint32_t tag = TransformPublisher::tagOf(getName());
     transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, tag,
                                                     [this](const std::string& what) { SDVO_WARN(what, what); });
-    mount_ = std::make_unique<CameraMount>(*transforms_, kTfTimeout);
+    mount_ = std::make_unique<CameraMount>(*transforms_);
     publisher_ = std::make_unique<PlacePublisher>(nh_, options_, robot_, tag, [this] { return map(); });
     using namespace stereo_descriptor_vo;
     serveReset(private_nh, [this] { reset(); });
@@ -387,7 +387,6 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     return std::make_shared<PlaceSession>(recognition_options_, loadPlaces(path));
   }
 
-  static constexpr double kTfTimeout = 2.0;   // s of wall time, at the start
   static constexpr double kRests = 20.0;      // ratio of the pause to the time that saving took (chosen)
   const ros::WallDuration kSavePeriod{60.0};  // s, the most that a killed process loses (chosen)
 

@@ -90,7 +90,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     starts_at_truth_ = !options_.ground_truth_frame_id.empty();
     transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), tag,
                                                     [this](const std::string& what) { SDVO_WARN(what, what); });
-    mount_ = std::make_unique<CameraMount>(*transforms_, options_.tf_timeout);
+    mount_ = std::make_unique<CameraMount>(*transforms_);
     patience_ = Patience(options_.guess_timeout);
     unused_ = std::make_unique<UnusedInput>("feature messages", options_.rates.max_unused,
                                             std::set<int>{UnusedInput::kPushedOut});
@@ -469,7 +469,7 @@ class VisualOdometryNodelet : public RobotNodelet {
       T_before_now = from.T_guess_since->inverse() * *T_guess_base;
     if (!T_before_now) return std::nullopt;
     const Eigen::Isometry3d T_base_camera = *mount_->last();
-    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera, false, options_.guess_error};
+    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera};
   }
 
   std::optional<MotionGuess> guessOfGyro(const ros::Time& since, const std_msgs::Header& header,

@@ -73,8 +73,10 @@ class RobotTransforms {
 /// odometry's origin. For any thread.
 class CameraMount {
  public:
-  /// `timeout`: s of wall time from the first await() on, after which none waits.
-  CameraMount(const RobotTransforms& transforms, double timeout) : transforms_(transforms), timeout_(timeout) {}
+  /// `timeout`: s of wall time from the first await() on, after which none waits (chosen: launch files start all nodes
+  /// within it).
+  explicit CameraMount(const RobotTransforms& transforms, double timeout = 2.0)
+      : transforms_(transforms), timeout_(timeout) {}
 
   /// Waits until TF has the transform, the timeout, or `is_urgent`: static transforms may come after the first
   /// features. Hold no lock meanwhile that others need.
