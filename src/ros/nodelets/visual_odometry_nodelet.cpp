@@ -17,11 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "../../check/axes_check.hpp"
-#include "../../check/mount_check.hpp"
-#include "../../common/imu_tracks.hpp"
 #include "../../common/stamp_filter.hpp"
-#include "../../common/text.hpp"
 #include "../../common/worker.hpp"
 #include "../../config/interface_options.hpp"
 #include "../../matching/patch_alignment.hpp"
@@ -33,8 +29,10 @@
 #include "../files/output_files.hpp"
 #include "../node/throttles.hpp"
 #include "../publishers/odometry_publisher.hpp"
-#include "../transforms/imu_input.hpp"
-#include "../transforms/transforms.hpp"
+#include "../transforms/axes_watch.hpp"
+#include "../transforms/guess_input.hpp"
+#include "../transforms/odometry_frames.hpp"
+#include "../transforms/start_pose.hpp"
 #include "robot_nodelet.hpp"
 #include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
@@ -76,25 +74,21 @@ class VisualOdometryNodelet : public RobotNodelet {
       throw std::invalid_argument("use_imu and guess_frame_id exclude each other: set one of them");
     if (options_.awaitsMotion() && options_.guess_frame_id.empty())
       throw std::invalid_argument("guess_min_translation and guess_min_rotation need guess_frame_id: set it, too");
-    checkFrames();
-    if (options_.ground_truth_base_frame_id.empty()) options_.ground_truth_base_frame_id = options_.base_frame_id;
-    for (std::string* frame : {&options_.odom_frame_id, &options_.base_frame_id, &options_.guess_frame_id,
-                               &options_.ground_truth_frame_id, &options_.ground_truth_base_frame_id})
-      *frame = cleanFrameId(*frame);
-    T_odom_start_ = ros_conversions::toPose(options_.initial_pose);
+    options_ = withCleanFrames(options_);
     odometry_ = std::make_unique<VisualOdometry>(reconfigured_);
     const std::uint32_t tag = TransformPublisher::tagOf(getName());
     publisher_ = std::make_unique<OdometryPublisher>(nh_, options_, tag);
-    publisher_->restart(T_odom_start_);
-    to_be_levelled_ = options_.use_imu;
-    starts_at_truth_ = !options_.ground_truth_frame_id.empty();
-    transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), tag,
-                                                    [this](const std::string& what) { SDVO_WARN(what, what); });
+    const auto warn = [this](const std::string& what) { SDVO_WARN(what, what); };
+    transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(options_), tag, warn);
     mount_ = std::make_unique<CameraMount>(*transforms_);
-    patience_ = Patience(options_.guess_timeout);
     unused_ = std::make_unique<UnusedInput>("feature messages", options_.rates.max_unused,
                                             std::set<int>{UnusedInput::kPushedOut});
     diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_, *unused_);
+    if (options_.use_imu) imu_ = std::make_unique<ImuInput>(nh_, *transforms_, *unused_, warn);
+    guesses_ = std::make_unique<GuessInput>(options_, *transforms_, imu_.get());
+    const auto place = [this](const Eigen::Isometry3d& T_odom_base) { publisher_->restart(T_odom_base); };
+    start_ = std::make_unique<StartPose>(options_, *transforms_, imu_.get(), place, warnAlways());
+    axes_.emplace(warnAlways());
     using namespace stereo_descriptor_vo;
     serveReset(slow_nh, [this] { startAgain(); });
     serve<ResetToPose>(slow_nh, "reset_to_pose",
@@ -121,9 +115,6 @@ class VisualOdometryNodelet : public RobotNodelet {
         },
         listOptions(defaults));
 
-    if (options_.use_imu)
-      imu_ = std::make_unique<ImuInput>(nh_, *transforms_, *unused_,
-                                        [this](const std::string& what) { SDVO_WARN(what, what); });
     worker_ = std::make_unique<Worker<FeaturesFilter::Passed>>(
         static_cast<std::size_t>(options_.queue_size),
         [this](const FeaturesFilter::Passed& passed) { process(passed); });
@@ -143,28 +134,9 @@ class VisualOdometryNodelet : public RobotNodelet {
         ros::TransportHints().tcpNoDelay())};
   }
 
-  void checkFrames() const {
-    ros_conversions::requireTwoFrames({"odom_frame_id", options_.odom_frame_id},
-                                      {"base_frame_id", options_.base_frame_id});
-    if (!options_.ground_truth_frame_id.empty() && options_.ground_truth_base_frame_id.empty() && options_.publish_tf)
-      throw std::invalid_argument("on TF base_frame_id is below odom_frame_id, not below ground_truth_frame_id: set "
-                                  "ground_truth_base_frame_id to the frame that has the base's true pose, or "
-                                  "publish_tf to false");
-    if (options_.guess_frame_id.empty()) return;
-    ros_conversions::requireTwoFrames({"guess_frame_id", options_.guess_frame_id},
-                                      {"base_frame_id", options_.base_frame_id});
-    if (options_.publish_tf)  // its own pose
-      ros_conversions::requireTwoFrames({"guess_frame_id", options_.guess_frame_id},
-                                        {"odom_frame_id", options_.odom_frame_id});
-  }
-
-  /// Parent and child of the transform that is published on TF.
-  std::optional<ros_conversions::OdometryFrames> publishedFrames() const {
-    if (!options_.publish_tf) return std::nullopt;
-    ros_conversions::OdometryFrames frames{
-        options_.odom_frame_id, options_.correctsGuess() ? options_.guess_frame_id : options_.base_frame_id};
-    if (options_.invert_tf) std::swap(frames.odom, frames.base);
-    return frames;
+  /// Of what happens seldom.
+  std::function<void(const std::string&)> warnAlways() {
+    return [this](const std::string& what) { NODELET_WARN_STREAM(what); };
   }
 
   void onFeatures(const FeaturesMessagePtr& message) try {
@@ -223,32 +195,28 @@ class VisualOdometryNodelet : public RobotNodelet {
     NODELET_ERROR_STREAM("features at " << passed.item.message->header.stamp << ": no vo_info: " << e.what());
   }
 
-  /// A motion since the pair of this time, if any.
+  /// The last processed pair, and the camera's motion since then, if they are known.
   struct Guess {
-    std::optional<ros::Time> since;
+    std::optional<GuessInput::Begin> since;
     std::optional<MotionGuess> motion;
-    std::optional<Eigen::Isometry3d> T_guess_since, T_guess_base;  ///< then and now, only where pairs may be left out
+    std::optional<Eigen::Isometry3d> T_guess_base;  ///< now, only where pairs may be left out
   };
 
   /// Whether the base has hardly moved since the last processed pair, in which the odometry was sure.
   bool isLeftOut(const Eigen::Isometry3d& T_guess_base, const ros::Time& stamp) const {
-    if (!T_guess_processed_ || !processed_stamp_) return false;
-    const Eigen::Isometry3d motion = T_guess_processed_->inverse() * T_guess_base;
+    if (!processed_ || !processed_->T_guess_base) return false;
+    const Eigen::Isometry3d motion = processed_->T_guess_base->inverse() * T_guess_base;
     return options_.isLeftOut(motion.translation().norm(), Eigen::AngleAxisd(motion.linear()).angle(),
-                              secondsBetween(*processed_stamp_, stamp));
+                              secondsBetween(processed_->stamp, stamp));
   }
 
   /// Unsubscribes the features while pairs would be left out, so that the image side rests, too. Not where the guess is
   /// old: it may have ended.
   void restWhileStanding() {
     const std::lock_guard<std::mutex> lock(work_mutex_);
-    const auto T_guess_base = [this](const ros::Time& time) {
-      std::string ignored;
-      return transforms_->find(options_.guess_frame_id, options_.base_frame_id, ignored, time);
-    };
     const ros::Time now = ros::Time::now();
-    const bool is_fresh = now.toSec() > kStanding && T_guess_base(now - ros::Duration(kStanding));
-    const auto newest = T_guess_base(ros::Time(0));
+    const bool is_fresh = now.toSec() > kStanding && guesses_->base(now - ros::Duration(kStanding));
+    const auto newest = guesses_->base(ros::Time(0));
     const bool stands = is_fresh && newest && isLeftOut(*newest, now);
     if (!stands) moved_at_ = steadyTime();
     const bool rests = stands && steadyTime() - moved_at_ > kStanding;
@@ -272,13 +240,10 @@ class VisualOdometryNodelet : public RobotNodelet {
     Guess guess;
     {
       const std::lock_guard<std::mutex> lock(work_mutex_);
-      const bool is_trusted = !options_.guess_frame_id.empty() || !gyro_found_.isFault();
-      if (is_trusted) guess.since = processed_stamp_;
-      guess.T_guess_since = T_guess_processed_;
+      if (!imu_ || axes_->trustsGyro()) guess.since = processed_;
     }
-    if (guess.since && mount_->last()) guess.motion = findGuess(guess, header, isVoid);
-    if (std::string ignored; options_.awaitsMotion())
-      guess.T_guess_base = transforms_->find(options_.guess_frame_id, options_.base_frame_id, ignored, header.stamp);
+    if (guess.since && mount_->last() && guesses_->hasSource()) guess.motion = awaitGuess(*guess.since, header, isVoid);
+    if (options_.awaitsMotion()) guess.T_guess_base = guesses_->base(header.stamp);
     return guess;
   }
 
@@ -291,8 +256,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
     features.stamp += time_shift_;
     std::string problem = findExtrinsic(cleanFrameId(message.header.frame_id));
-    if (problem.empty() && starts_at_truth_ && !given_start_) problem = startAtTruth(message.header.stamp);
-    if (problem.empty() && to_be_levelled_ && !given_start_) problem = level();
+    if (problem.empty()) problem = start_->find(message.header.stamp);
     const OdometryResult result = problem.empty() ? track(features, message, guess) : waitFor(problem);
     publisher_->publishPoints(passed.item.view);
     publisher_->publishFlow(result, features, message.header);
@@ -321,8 +285,7 @@ class VisualOdometryNodelet : public RobotNodelet {
                         << " to " << passed.item.message->header.stamp << ": the odometry goes on, "
                         << 1e-9 * static_cast<double>(by_arrivals) << " s after the pair before");
     time_shift_ += by_arrivals - by_stamps;
-    processed_stamp_.reset();
-    T_guess_processed_.reset();
+    processed_.reset();
   }
 
   OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message, const Guess& guess) {
@@ -331,51 +294,34 @@ class VisualOdometryNodelet : public RobotNodelet {
     const std::string complaint = PatchAlignmentOptions().complaint(features.patch_layout.side);
     if (!complaint.empty()) SDVO_WARN("patches", complaint);
     odometry_->mountAt(*mount_->last());
-    const std::optional<MotionGuess> motion = guess.since == processed_stamp_ ? guess.motion : std::nullopt;  // no jump
+    const bool has_jumped = !processed_ || !guess.since || guess.since->stamp != processed_->stamp;
+    const std::optional<MotionGuess> motion = has_jumped ? std::nullopt : guess.motion;
     OdometryResult result = odometry_->update(features, motion);
     result.stamp = nanoseconds(message.header.stamp);
     if (result.state == TrackingState::kTracking && result.has_motion) compareAxes(result, motion, message.header);
-    processed_stamp_ = message.header.stamp;
+    processed_ = {message.header.stamp, std::nullopt};
     epoch_ = result.epoch;
     report(result, message.header.stamp);
     std::optional<Eigen::Isometry3d> T_guess_base;
-    if (std::string ignored; options_.correctsGuess() || options_.awaitsMotion())
-      T_guess_base = transforms_->find(options_.guess_frame_id, options_.base_frame_id, ignored, message.header.stamp);
-    T_guess_processed_.reset();
-    if (options_.awaitsMotion() && result.state == TrackingState::kTracking) T_guess_processed_ = T_guess_base;
+    if (options_.correctsGuess() || options_.awaitsMotion()) T_guess_base = guesses_->base(message.header.stamp);
+    if (options_.awaitsMotion() && result.state == TrackingState::kTracking) processed_->T_guess_base = T_guess_base;
     publisher_->publish(result, *mount_->last(), T_guess_base);
     publisher_->publishErrors([this](const ros::Time& stamp) {
       std::string ignored;
-      return truthAt(stamp, ignored);
+      return start_->truth(stamp, ignored);
     });
     if (publisher_->wantsMap() && result.has_pose)
       publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
     return result;
   }
 
-  /// Compares the axes of camera and IMU on TF with the motion in the images.
   void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess,
                    const std_msgs::Header& header) {
-    const auto warnOnce = [this](const char* step, Finding& last, const Finding& found, const char* consequence) {
-      if (!std::exchange(last, found).isFault() && found.isFault())
-        NODELET_WARN_STREAM(step << ": " << found.text() << consequence);
-    };
-    if (!base_is_camera_) optical_axis_.add(*mount_->last(), result.T_previous_current);
-    warnOnce("axes", optical_found_, optical_axis_.judge(), "");
-    mount_check_.add(*mount_->last(), result.T_previous_current);
-    if (const PlanarOptions& floor = odometry_->options().planar; floor.planar && !mount_found_.isFault())
-      warnOnce("mount", mount_found_, mount_check_.judge(floor.planar_tilt_sigma), "");
+    axes_->add(*mount_->last(), base_is_camera_, result.T_previous_current, odometry_->options().planar);
     constexpr double kSame = 1e-3;  // s: after an outage the motion is of another time than the guess
-    if (!guess || !guess->rotation_only ||
-        std::abs(secondsBetween(*processed_stamp_, header.stamp) - result.dt) > kSame)
-      return;
-    gyro_axes_.add(nanoseconds(*processed_stamp_), nanoseconds(header.stamp), guess->T_previous_current.linear(),
-                   result.T_previous_current.linear());
-    const auto gyro = [&](std::int64_t from, std::int64_t to) {
-      std::string ignored;
-      return imu_->rotation(cleanFrameId(header.frame_id), from, to, ignored);
-    };
-    warnOnce("IMU", gyro_found_, gyro_axes_.judge(gyro), " No guess is taken from it until a reset");
+    if (guess && guess->rotation_only && std::abs(secondsBetween(processed_->stamp, header.stamp) - result.dt) <= kSame)
+      axes_->addGyro(*imu_, cleanFrameId(header.frame_id), processed_->stamp, header.stamp,
+                     guess->T_previous_current.linear(), result.T_previous_current.linear());
   }
 
   OdometryResult waitFor(const std::string& what) const {
@@ -416,42 +362,25 @@ class VisualOdometryNodelet : public RobotNodelet {
 
   /// At a given pose of the base, or at the initial one.
   void restart(const char* why, const std::optional<Eigen::Isometry3d>& given = std::nullopt) {
-    const Eigen::Isometry3d T_odom_start = given.value_or(T_odom_start_);
+    const Eigen::Isometry3d T_odom_start = given.value_or(start_->T_odom_base());
     NODELET_WARN_STREAM(
         why << ": the odometry starts again from "
             << (T_odom_start.isApprox(Eigen::Isometry3d::Identity()) ? "the origin" : "the given pose"));
     odometry_->reset();
     time_shift_ = 0;
     mount_->forget();
-    optical_axis_ = {};
-    gyro_axes_ = {};
-    mount_check_ = {};
-    optical_found_ = gyro_found_ = mount_found_ = {};
-    publisher_->restart(T_odom_start);
-    given_start_ = given.has_value();
-    starts_at_truth_ = !options_.ground_truth_frame_id.empty();
-    levels_until_.reset();
+    axes_.emplace(warnAlways());
+    start_->restart(given);
     processed_epoch_.reset();
-    processed_stamp_.reset();
-    T_guess_processed_.reset();
+    processed_.reset();
   }
 
-  /// The camera's motion since the previous pair by another odometry or the gyro; nothing if neither is enabled or has
-  /// it.
-  std::optional<MotionGuess> findGuess(const Guess& from, const std_msgs::Header& header,
-                                       const std::function<bool()>& is_void) {
-    const bool of_frame = !options_.guess_frame_id.empty();
-    if (!of_frame && !(imu_ && imu_->hasRates())) return std::nullopt;
+  std::optional<MotionGuess> awaitGuess(const GuessInput::Begin& since, const std_msgs::Header& header,
+                                        const std::function<bool()>& is_void) {
+    const double begin = steadyTime();
     std::string problem;
-    std::optional<MotionGuess> guess;
-    const double now = steadyTime(), give_up = now + patience_.timeout(now);
-    for (;;) {
-      guess = of_frame ? guessOfFrame(from, header.stamp, problem) : guessOfGyro(*from.since, header, problem);
-      if (guess || steadyTime() >= give_up || is_void() || !ros::ok()) break;
-      ros::WallDuration(0.002).sleep();
-    }
-    patience_.note(guess.has_value(), now);
-    diagnostics_->load().noteWait("the guess of the motion", steadyTime() - now);
+    const auto guess = guesses_->await(since, header, *mount_->last(), is_void, problem);
+    diagnostics_->load().noteWait("the guess of the motion", steadyTime() - begin);
     if (guess) return guess;
     unused_->add(UnusedInput::kNoGuess);
     SDVO_WARN("guess", "no guess of the motion until " << header.stamp << ", going on without: " << problem);
@@ -459,70 +388,6 @@ class VisualOdometryNodelet : public RobotNodelet {
   }
 
   static double steadyTime() { return ros::SteadyTime::now().toSec(); }
-
-  std::optional<MotionGuess> guessOfFrame(const Guess& from, const ros::Time& stamp, std::string& problem) const {
-    const std::string &fixed = options_.guess_frame_id, &base = options_.base_frame_id;
-    std::optional<Eigen::Isometry3d> T_before_now;
-    if (!from.T_guess_since)
-      T_before_now = transforms_->findMotion(fixed, base, *from.since, stamp, problem);
-    else if (const auto T_guess_base = transforms_->find(fixed, base, problem, stamp))  // TF does not go back for long
-      T_before_now = from.T_guess_since->inverse() * *T_guess_base;
-    if (!T_before_now) return std::nullopt;
-    const Eigen::Isometry3d T_base_camera = *mount_->last();
-    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera};
-  }
-
-  std::optional<MotionGuess> guessOfGyro(const ros::Time& since, const std_msgs::Header& header,
-                                         std::string& problem) const {
-    const std::optional<Eigen::Matrix3d> R_before_now =
-        imu_->rotation(cleanFrameId(header.frame_id), nanoseconds(since), nanoseconds(header.stamp), problem);
-    if (!R_before_now) return std::nullopt;
-    MotionGuess guess;
-    guess.T_previous_current.linear() = *R_before_now;
-    guess.rotation_only = true;
-    return guess;
-  }
-
-  /// Takes roll and pitch of the first pose from the accelerometer, if the robot stands. That needs a second of
-  /// measurements, for which it waits 2 s. Returns what is missing; empty when done.
-  std::string level() {
-    constexpr double kTimeout = 2.0;  // s of wall time
-    const double now = steadyTime();
-    if (!levels_until_) levels_until_ = now + kTimeout;
-    std::string problem;
-    auto up = imu_->up(options_.base_frame_id, problem);
-    constexpr double kSteep = 0.7;  // cosine of 45 degrees, between robots on slopes and another mounting (chosen)
-    if (up && up->dot(T_odom_start_.linear().transpose() * Eigen::Vector3d::UnitZ()) < kSteep) {
-      problem = text(2, "by its accelerometer the base is tilted from there, its up is ", up->x(), " ", up->y(), " ",
-                     up->z(), ": is the IMU mounted as TF has its frame? Else give this tilt in initial_pose");
-      up.reset();
-      levels_until_ = now;
-    }
-    if (!up && now < *levels_until_) return "roll and pitch of the first pose: " + problem;
-    to_be_levelled_ = false;
-    if (up) {
-      T_odom_start_ = levelled(T_odom_start_, *up);
-      publisher_->restart(T_odom_start_);
-    } else {
-      NODELET_WARN_STREAM("roll and pitch of the first pose are those of initial_pose: " << problem);
-    }
-    return "";
-  }
-
-  std::optional<Eigen::Isometry3d> truthAt(const ros::Time& stamp, std::string& problem) const {
-    return transforms_->find(options_.ground_truth_frame_id, options_.ground_truth_base_frame_id, problem, stamp);
-  }
-
-  /// Takes the first pose from the truth, for which it waits. Returns what is missing; empty when done.
-  std::string startAtTruth(const ros::Time& stamp) {
-    std::string problem;
-    const auto T_odom_base = truthAt(stamp, problem);
-    if (!T_odom_base) return "the first pose is that of ground_truth_frame_id: " + problem;
-    starts_at_truth_ = to_be_levelled_ = false;
-    T_odom_start_ = *T_odom_base;
-    publisher_->restart(T_odom_start_);
-    return "";
-  }
 
   /// Finds the camera's pose on the robot. Returns what is missing; empty if it is known.
   std::string findExtrinsic(const std::string& camera_frame) {
@@ -538,10 +403,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     if (const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem)) {
       if (const Finding mount = checkMount(base_frame, camera_frame, *found); mount.isFault())
         NODELET_WARN_STREAM(mount.remedy);
-      if (base_frame == camera_frame && !std::exchange(base_is_camera_, true)) {
-        T_odom_start_ = T_odom_start_ * ros_conversions::bodyToOptical();
-        if (!given_start_) publisher_->restart(T_odom_start_);
-      }
+      if (base_frame == camera_frame && !std::exchange(base_is_camera_, true)) start_->turnToOptical();
       if (!camera_frame_.empty() && camera_frame_ != camera_frame)
         NODELET_WARN_STREAM("the images' frame was '" << camera_frame_ << "' and is '" << camera_frame
                                                       << "' now: another camera goes on from the base's last pose "
@@ -578,7 +440,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     odometry_->takePose(to_camera * covariance * to_camera.transpose());
     const Eigen::Isometry3d T_start_base = *T_base_camera * odometry_->lastPose() * T_base_camera->inverse();
     publisher_->moveTo(T_odom_base * T_start_base.inverse());
-    given_start_ = true;
+    start_->give();
   }
 
   /// Returns the number of poses and the file in words.
@@ -608,6 +470,7 @@ class VisualOdometryNodelet : public RobotNodelet {
   std::unique_ptr<CameraMount> mount_;
   std::unique_ptr<UnusedInput> unused_;
   std::unique_ptr<ImuInput> imu_;  // none without use_imu
+  std::unique_ptr<GuessInput> guesses_;
   std::unique_ptr<OdometryPublisher> publisher_;
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   ros::Subscriber pose_subscriber_;
@@ -624,7 +487,8 @@ class VisualOdometryNodelet : public RobotNodelet {
   // The worker's thread touches these, and services do.
   std::mutex work_mutex_;
   std::unique_ptr<VisualOdometry> odometry_;
-  Eigen::Isometry3d T_odom_start_;  // of a run
+  std::unique_ptr<StartPose> start_;
+  std::optional<AxesWatch> axes_;
   int source_restarts_ = 0, clock_steps_ = 0;
   std::optional<std::pair<std::int64_t, std::int64_t>> last_arrival_;  // stamp and arrival of the last pair, ns
   std::int64_t time_shift_ = 0;  // ns, from stamps to times of the odometry, which never jump
@@ -632,23 +496,13 @@ class VisualOdometryNodelet : public RobotNodelet {
   bool is_tracking_ = false;  // TRACKING was reported, and no LOST since
   std::string camera_frame_;
   std::optional<std::uint32_t> processed_epoch_;
-  std::optional<ros::Time> processed_stamp_;
-  std::optional<Eigen::Isometry3d> T_guess_processed_;  // of the base, then, if the odometry tracked
-  double moved_at_ = steadyTime();                      // s: pairs were last wanted
-  bool rests_ = false;                                  // the input
-  ros::Time corrected_at_;                              // while it rests; TF takes a stamp once
+  std::optional<GuessInput::Begin> processed_;  // the last pair; with the base, if the odometry tracked then
+  double moved_at_ = steadyTime();              // s: pairs were last wanted
+  bool rests_ = false;                          // the input
+  ros::Time corrected_at_;                      // while it rests; TF takes a stamp once
   ros::WallTimer rest_timer_;
-  bool to_be_levelled_ = false;   // T_odom_start_ still needs the accelerometer
-  bool starts_at_truth_ = false;  // … the truth
   bool latency_reported_ = false;
-  bool base_is_camera_ = false;         // the base has optical axes, those of odom are REP-105's
-  bool given_start_ = false;            // a service has set the pose, which is not levelled
-  std::optional<double> levels_until_;  // s, steady time
-  Patience patience_{0.0};              // with guesses
-  OpticalAxisCheck optical_axis_;
-  GyroAxesCheck gyro_axes_;
-  MountCheck mount_check_;
-  Finding optical_found_{}, gyro_found_{}, mount_found_{};  // as reported last
+  bool base_is_camera_ = false;  // the base has optical axes, those of odom are REP-105's
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
   std::unique_ptr<PausableInput> input_;
