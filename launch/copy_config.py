@@ -6,7 +6,6 @@ import difflib
 import glob
 import os
 import sys
-import time
 import xml.etree.ElementTree
 
 import rosparam  # noqa: F401 reads !degrees and !radians for yaml
@@ -18,7 +17,6 @@ OPTIONS = ('stereo_features/detector/mask', 'stereo_features/detector/max_featur
            'visual_odometry/initial_pose', 'visual_odometry/publish_null_when_lost',
            'place_recognition/robot_name', 'place_recognition/save_at_shutdown')
 LARGEST = 1000000  # bytes, of options
-LONGEST = 60  # s that a launch takes to read the copy
 
 
 def without_empty(value):
@@ -86,22 +84,6 @@ def refuse_unknown_arguments():
                     file, name, ': is it %s?' % alike[0] if alike else '', file))
 
 
-def remove_with_the_launch(copy):
-    """In a process of its own: a launch that fails has no last word."""
-    launch = os.getppid()
-    if os.fork() > 0:
-        return
-    os.setsid()
-    for stream in (0, 1, 2):  # which the launch reads to their end
-        os.dup2(os.open(os.devnull, os.O_RDWR), stream)
-    end = time.monotonic() + LONGEST
-    while os.path.exists(copy) and os.path.exists('/proc/%d' % launch) and time.monotonic() < end:
-        time.sleep(0.1)
-    if os.path.exists(copy):
-        os.remove(copy)
-    os._exit(0)
-
-
 def main(path, copy):
     refuse_unknown_arguments()
     try:
@@ -124,7 +106,6 @@ def main(path, copy):
             yaml.safe_dump(config, file)
     except (OSError, ValueError, yaml.YAMLError) as error:
         sys.exit('ERROR: config %s: %s' % (path, error))
-    remove_with_the_launch(copy)
 
 
 if __name__ == '__main__':

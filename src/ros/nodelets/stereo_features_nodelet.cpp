@@ -33,16 +33,14 @@ namespace {
 
 /// Whether descriptors of these options can be matched with each other. Detector and stereo options do not matter.
 bool describeAlike(const FeatureExtractorOptions& a, const FeatureExtractorOptions& b) {
-  const auto texts = [](FeatureExtractorOptions options) {
+  const auto hash = [](FeatureExtractorOptions options) {
     OptionList list;
     options.size_curve = options.sizeCurve();
     options.size_curve.describe(list);
     options.descriptor.describe(list);
-    std::vector<std::string> values;
-    for (const Option& option : list.options()) values.push_back(option.text());
-    return values;
+    return hashOptions(list.options());
   };
-  return texts(a) == texts(b);
+  return hash(a) == hash(b);
 }
 
 }  // namespace
