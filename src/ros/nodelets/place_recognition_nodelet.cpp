@@ -6,7 +6,6 @@
 #include <atomic>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -125,15 +124,15 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   void beginWith(const std::string& path) {
     map_file_ = path;
     if (options_.save_at_shutdown) WholeFile{path};  // throws where the end could not write it
-    kept_ = {{path, 0}};
+    kept_ = 0;
     if (!std::filesystem::exists(path)) {
       NODELET_WARN_STREAM("places_file '" << path
                                           << "' does not exist: begins without places, save_places writes such a file");
       return;
     }
     session_ = load(path);
-    kept_[path] = session_->recognition().places().size();
-    NODELET_INFO_STREAM(session_->recognition().places().size() << " places of '" << path << "'");
+    kept_ = session_->recognition().places().size();
+    NODELET_INFO_STREAM(*kept_ << " places of '" << path << "'");
   }
 
   // Input, in the callbacks' thread.
@@ -305,7 +304,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++generation_;
     map_file_.clear();
-    kept_.clear();
+    kept_.reset();
     restart("reset was called", std::make_shared<PlaceSession>(recognition_options_));
   }
 
@@ -322,9 +321,9 @@ class PlaceRecognitionNodelet : public RobotNodelet {
           "not saved: localisation_only keeps the map as it is in the file that it was loaded from");
     savePlaces(saved, robot_, options_.map_frame_id, path, options_.overwrite);
     lock.lock();
-    if (generation == generation_) {
-      kept_[path] = saved.places.size();
-      if (path == inRosHome(options_.places_file)) saved_changes_ = changes;
+    if (generation == generation_ && path == inRosHome(options_.places_file)) {
+      kept_ = saved.places.size();
+      saved_changes_ = changes;
     }
     return std::to_string(saved.places.size()) + " places in '" + path + "'";
   }
@@ -340,16 +339,12 @@ class PlaceRecognitionNodelet : public RobotNodelet {
         NODELET_WARN_STREAM(what);
     };
     std::unique_lock<std::mutex> lock(mutex_);
-    const std::size_t places = session_->recognition().places().size();
-    const auto kept = kept_.find(path);
-    const bool would_lose_places = kept == kept_.end() || places < kept->second;
-    const bool is_refused = would_lose_places && std::filesystem::exists(path) && !options_.overwrite;
+    const std::size_t places = session_->recognition().places().size(), before = kept_.value_or(0);
+    const bool would_lose_places = !kept_ || places < before;
     const bool has_changed = changes_ != saved_changes_ && places > 0;
-    const bool is_due = has_changed && (at_end || ros::SteadyTime::now() >= next_save_);
-    const std::size_t before = kept == kept_.end() ? 0 : kept->second;
     lock.unlock();
-    if (!is_due) return;
-    if (is_refused) {
+    if (!has_changed || (!at_end && ros::SteadyTime::now() < next_save_)) return;
+    if (would_lose_places && std::filesystem::exists(path) && !options_.overwrite) {
       if (at_end)
         say("the map's " + std::to_string(places) + " places are not saved: '" + path +
             "' has others, or more; call save_places before the end, or set place_recognition/overwrite");
@@ -378,7 +373,8 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     ++generation_;
     replace(std::move(loaded));
     map_file_ = file;
-    kept_ = {{file, places}};
+    kept_.reset();
+    if (file == inRosHome(options_.places_file)) kept_ = places;
     return outcome;
   }
 
@@ -403,12 +399,12 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   ros::SteadyTime next_save_;  // the disk's thread
 
   std::mutex mutex_;
-  std::shared_ptr<PlaceSession> session_;    // and all in it: under mutex_
-  std::string map_file_;                     // file of its first places; empty: none
-  std::map<std::string, std::size_t> kept_;  // files that were loaded or saved, with their number of places
-  int changes_ = 0, saved_changes_ = 0;      // of the session; of it those in places_file
-  bool was_located_ = false;                 // at the last publish(): map -> odom is on TF
-  std::atomic<int> generation_{0};           // sessions that a service began
+  std::shared_ptr<PlaceSession> session_;  // and all in it: under mutex_
+  std::string map_file_;                   // file of its first places; empty: none
+  std::optional<std::size_t> kept_;        // places in places_file; none: it has another map
+  int changes_ = 0, saved_changes_ = 0;    // of the session; of it those in places_file
+  bool was_located_ = false;               // at the last publish(): map -> odom is on TF
+  std::atomic<int> generation_{0};         // sessions that a service began
   std::atomic<bool> stopping_{false};
   // Only the observer's thread touches this.
   stereo_descriptor_vo::VoInfo::ConstPtr mount_of_;
