@@ -155,8 +155,6 @@ struct PlaceOutputOptions {
   bool save_at_shutdown = false;
   bool overwrite = false;
   std::string robot_name;
-  double other_min_score = 0.05;  ///< likeness from which another robot is asked for its rows (chosen)
-  double other_timeout = 2.0;     ///< s of wall time in which another robot must answer (chosen)
   bool initialpose_while_mapping = false;
 
   void describe(OptionList& list) {

@@ -101,8 +101,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(options_.queue_size),
                                                   [this](const Arrived& arrived) { observe(arrived); });
     optimiser_ = std::make_unique<Worker<Job>>(1, [this](const Job& job) { optimise(job); });
-    other_ = std::make_unique<OtherRobot>(other_nh, robot_, options_.other_min_score, options_.other_timeout,
-                                          placesForOthers());
+    other_ = std::make_unique<OtherRobot>(other_nh, robot_, placesForOthers());
     unused_ = std::make_unique<UnusedInput>("pairs", RateOptions().max_unused);
     input_ = std::make_unique<OdometryPairInput>(
         nh_, options_.sync_queue_size, *unused_, [this](const OdometryPair& pair) { onPair(pair); },
