@@ -147,7 +147,6 @@ struct OdometryOutputOptions {
 struct PlaceOutputOptions {
   std::string map_frame_id = "map";
   bool publish_tf = true;
-  double correction_time = 2.0;  ///< s in which a correction goes into map -> odom (chosen)
   int sync_queue_size = 100;
   int queue_size = 10;
   double max_silence = 10.0;  ///< s of wall time without a pair, which /diagnostics warn of (chosen)
