@@ -70,7 +70,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     ros_conversions::requireName({"map_frame_id", options_.map_frame_id});
     options_.map_frame_id = cleanFrameId(options_.map_frame_id);
     robot_ = options_.robot_name.empty() ? nh_.getNamespace() : options_.robot_name;
-    session_ = std::make_shared<PlaceSession>(recognition_options_);
+    ours_.session = std::make_shared<PlaceSession>(recognition_options_);
     if (options_.save_at_shutdown && (options_.places_file.empty() || recognition_options_.localisation_only))
       throw std::invalid_argument("save_at_shutdown needs a places_file, and a map that is not localisation_only");
     if (!options_.places_file.empty()) beginWith(inRosHome(options_.places_file));
@@ -89,8 +89,8 @@ class PlaceRecognitionNodelet : public RobotNodelet {
       response.message = replaceBy(inRosHome(request.path));
     });
     serve<GetPlace>(slow_nh, "get_place", [this](const auto& request, auto& response) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      const auto place = session_->message(static_cast<int>(request.id), robot_);
+      const std::lock_guard<std::mutex> lock(ours_.mutex);
+      const auto place = ours_.session->message(static_cast<int>(request.id), robot_);
       if (!place) throw std::invalid_argument("there is no place " + std::to_string(request.id));
       response.place = *place;
     });
@@ -101,7 +101,9 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(options_.queue_size),
                                                   [this](const Arrived& arrived) { observe(arrived); });
     optimiser_ = std::make_unique<Worker<Job>>(1, [this](const Job& job) { optimise(job); });
-    other_ = std::make_unique<OtherRobot>(other_nh, robot_, placesForOthers());
+    other_ = std::make_unique<OtherRobot>(
+        other_nh, robot_, ours_, *publisher_,
+        [this](const std::string& what, const std::string& kind) { SDVO_WARN(kind, what); });
     unused_ = std::make_unique<UnusedInput>("pairs", RateOptions().max_unused);
     input_ = std::make_unique<OdometryPairInput>(
         nh_, options_.sync_queue_size, *unused_, [this](const OdometryPair& pair) { onPair(pair); },
@@ -129,19 +131,19 @@ class PlaceRecognitionNodelet : public RobotNodelet {
                                           << "' does not exist: begins without places, save_places writes such a file");
       return;
     }
-    session_ = load(path);
-    kept_ = session_->recognition().places().size();
+    ours_.session = load(path);
+    kept_ = ours_.session->recognition().places().size();
     NODELET_INFO_STREAM(*kept_ << " places of '" << path << "'");
   }
 
   // Input, in the callbacks' thread.
 
   void onInitialPose(const geometry_msgs::PoseWithCovarianceStamped& message) try {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (session_->isMapping() && !options_.initialpose_while_mapping)
+    const std::lock_guard<std::mutex> lock(ours_.mutex);
+    if (ours_.session->isMapping() && !options_.initialpose_while_mapping)
       throw std::invalid_argument(
           "it would move the robot while its map grows; set initialpose_while_mapping for that");
-    NODELET_WARN_STREAM("initialpose: " << session_->expect(message, options_.map_frame_id));
+    NODELET_WARN_STREAM("initialpose: " << ours_.session->expect(message, options_.map_frame_id));
   } catch (const std::exception& e) {
     NODELET_WARN_STREAM("the pose on initialpose is not used: " << e.what());
   }
@@ -162,9 +164,9 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     const ros::Time stamp = pair.features->header.stamp;
     const std::optional<Eigen::Isometry3d> T_base_camera = findExtrinsic(pair);
     if (!T_base_camera) return;
-    std::unique_lock<std::mutex> lock(mutex_);
+    std::unique_lock<std::mutex> lock(ours_.mutex);
     if (arrived.generation != generation_) return;
-    const PlaceSession::Time time = session_->noteTime(stamp, ros::Time::now(), ros::Time::isSimTime());
+    const PlaceSession::Time time = ours_.session->noteTime(stamp, ros::Time::now(), ros::Time::isSimTime());
     if (time == PlaceSession::Time::kStands) return;
     if (time == PlaceSession::Time::kBeganAnew) {
       const std::string file = map_file_;
@@ -177,7 +179,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     if (time == PlaceSession::Time::kFell)
       NODELET_WARN_STREAM("the stamps of the features jumped back to "
                           << stamp << " (camera driver restarted?): the places stay, the motion in between is unknown");
-    if (const std::optional<PlaceReport> report = session_->observe(pair, *T_base_camera)) publish(*report, stamp);
+    if (const std::optional<PlaceReport> report = ours_.session->observe(pair, *T_base_camera)) publish(*report, stamp);
   } catch (const std::exception& e) {
     unused_->add(UnusedInput::kRefused);
     SDVO_ERROR(e.what(), "pair at " << arrived.pair.features->header.stamp << " skipped: " << e.what());
@@ -202,11 +204,11 @@ class PlaceRecognitionNodelet : public RobotNodelet {
 
   /// Under the lock, as are the functions below. `report`: of the session's newest key frame.
   void publish(const PlaceReport& report, const ros::Time& stamp) {
-    const PlaceSession& session = *session_;
+    const PlaceSession& session = *ours_.session;
     const PlaceRecognition& recognition = session.recognition();
     if (report.loop) {
       NODELET_INFO_STREAM("key frame " << report.id << " shows the place of key frame " << *report.same << ": a loop");
-      optimiser_->push({recognition.graph(), session_});
+      optimiser_->push({recognition.graph(), ours_.session});
     }
     if (session.isPlaced())
       publisher_->correct(recognition.T_map_odom(), session.odomFrame(), !was_located_ || !session.isLocated());
@@ -229,7 +231,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   }
 
   void restart(const char* why, std::shared_ptr<PlaceSession> anew) {
-    NODELET_WARN_STREAM(why << ": " << session_->recognition().places().size() << " places are forgotten"
+    NODELET_WARN_STREAM(why << ": " << ours_.session->recognition().places().size() << " places are forgotten"
                             << (map_file_.empty() ? "" : ", but for those of '" + map_file_ + "'"));
     replace(std::move(anew));
   }
@@ -243,8 +245,8 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   }
 
   void replace(std::shared_ptr<PlaceSession> session) {
-    session_ = std::move(session);
-    was_located_ = session_->isLocated();
+    ours_.session = std::move(session);
+    was_located_ = ours_.session->isLocated();
     publisher_->forget();
     diagnostics_->restart();
   }
@@ -253,12 +255,12 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   void optimise(const Job& job) try {
     PoseGraph graph = job.graph;
     const PoseGraph::Summary summary = graph.optimise();
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (job.session != session_) return;
-    PlaceSession& session = *session_;
+    const std::lock_guard<std::mutex> lock(ours_.mutex);
+    if (job.session != ours_.session) return;
+    PlaceSession& session = *ours_.session;
     session.optimise_time = summary.time;
     if (!session.recognition().adopt(graph)) {
-      optimiser_->push({session.recognition().graph(), session_});
+      optimiser_->push({session.recognition().graph(), ours_.session});
       return;
     }
     if (session.isPlaced()) publisher_->correct(session.recognition().T_map_odom(), session.odomFrame(), false);
@@ -274,33 +276,14 @@ class PlaceRecognitionNodelet : public RobotNodelet {
 
   /// For the publisher.
   PlacePublisher::Map map() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return {session_->map(), mount_->last()};
-  }
-
-  // For the other robot, in the thread of slow callbacks.
-
-  /// A function of the session, called under its lock.
-  template <class Function>
-  auto locked(Function function) {
-    return [this, function](const auto&... arguments) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      return function(*session_, arguments...);
-    };
-  }
-
-  OtherRobot::Places placesForOthers() {
-    return {locked([](const PlaceSession& session, const auto& signature) { return session.find(signature); }),
-            locked([](const PlaceSession& session, int id, const Place& other) { return session.verify(id, other); }),
-            locked([this](const PlaceSession& session, int id) { return session.message(id, robot_); }),
-            [this](const auto& match) { publisher_->publish(match); },
-            [this](const auto& what, const auto& kind) { SDVO_WARN(kind, what); }};
+    const std::lock_guard<std::mutex> lock(ours_.mutex);
+    return {ours_.session->map(), mount_->last()};
   }
 
   // The services.
 
   void reset() {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::lock_guard<std::mutex> lock(ours_.mutex);
     ++generation_;
     map_file_.clear();
     kept_.reset();
@@ -309,8 +292,8 @@ class PlaceRecognitionNodelet : public RobotNodelet {
 
   /// Returns the number of places and the file in words.
   std::string save(const std::string& path) {
-    std::unique_lock<std::mutex> lock(mutex_);
-    const SavedPlaces saved = session_->saved();
+    std::unique_lock<std::mutex> lock(ours_.mutex);
+    const SavedPlaces saved = ours_.session->saved();
     const int changes = changes_, generation = generation_;
     lock.unlock();
     if (saved.places.empty())
@@ -337,8 +320,8 @@ class PlaceRecognitionNodelet : public RobotNodelet {
       else
         NODELET_WARN_STREAM(what);
     };
-    std::unique_lock<std::mutex> lock(mutex_);
-    const std::size_t places = session_->recognition().places().size(), before = kept_.value_or(0);
+    std::unique_lock<std::mutex> lock(ours_.mutex);
+    const std::size_t places = ours_.session->recognition().places().size(), before = kept_.value_or(0);
     const bool would_lose_places = !kept_ || places < before;
     const bool has_changed = changes_ != saved_changes_ && places > 0;
     lock.unlock();
@@ -364,11 +347,12 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   /// Begins anew with the places of a file. Returns their number in words.
   std::string replaceBy(const std::string& file) {
     std::shared_ptr<PlaceSession> loaded = load(file);
-    const std::lock_guard<std::mutex> lock(mutex_);
-    loaded->refuseOtherCameraThan(*session_);
+    const std::lock_guard<std::mutex> lock(ours_.mutex);
+    loaded->refuseOtherCameraThan(*ours_.session);
     const std::size_t places = loaded->recognition().places().size();
     const std::string outcome = std::to_string(places) + " places; " +
-                                std::to_string(session_->recognition().places().size()) + " of before are forgotten";
+                                std::to_string(ours_.session->recognition().places().size()) +
+                                " of before are forgotten";
     ++generation_;
     replace(std::move(loaded));
     map_file_ = file;
@@ -397,13 +381,12 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   ros::WallTimer saving_;
   ros::SteadyTime next_save_;  // the disk's thread
 
-  std::mutex mutex_;
-  std::shared_ptr<PlaceSession> session_;  // and all in it: under mutex_
-  std::string map_file_;                   // file of its first places; empty: none
-  std::optional<std::size_t> kept_;        // places in places_file; none: it has another map
-  int changes_ = 0, saved_changes_ = 0;    // of the session; of it those in places_file
-  bool was_located_ = false;               // at the last publish(): map -> odom is on TF
-  std::atomic<int> generation_{0};         // sessions that a service began
+  SharedSession ours_;
+  std::string map_file_;                 // file of its first places; empty: none
+  std::optional<std::size_t> kept_;      // places in places_file; none: it has another map
+  int changes_ = 0, saved_changes_ = 0;  // of the session; of it those in places_file
+  bool was_located_ = false;             // at the last publish(): map -> odom is on TF
+  std::atomic<int> generation_{0};       // sessions that a service began
   std::atomic<bool> stopping_{false};
   // Only the observer's thread touches this.
   stereo_descriptor_vo::VoInfo::ConstPtr mount_of_;

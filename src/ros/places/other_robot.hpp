@@ -15,7 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "../../messages/place_conversions.hpp"
+#include "../publishers/place_publisher.hpp"
+#include "place_session.hpp"
 
 namespace sdvo {
 
@@ -28,18 +29,12 @@ class OtherRobot {
   using SignatureMessage = stereo_descriptor_vo::PlaceSignature;
   using PlaceMessage = stereo_descriptor_vo::Place;
 
-  /// Access to our places. Functions may throw std::invalid_argument.
-  struct Places {
-    std::function<std::vector<PlaceCandidate>(const SignatureMessage&)> find;  ///< the best first
-    /// Geometric match of one of our places with the other robot's; nothing if they are not the same place.
-    std::function<std::optional<stereo_descriptor_vo::PlaceMatch>(int place, const Place& other)> verify;
-    std::function<std::optional<PlaceMessage>(int place)> get;  ///< nothing if the place was forgotten
-    std::function<void(const stereo_descriptor_vo::PlaceMatch&)> publish;
-    std::function<void(const std::string& what, const std::string& kind)> warn;  ///< one of a kind now and then
-  };
+  /// One of a kind now and then.
+  using Warn = std::function<void(const std::string& what, const std::string& kind)>;
 
   /// `robot`: our own name, whose signatures are refused. Callbacks run in the queue of `nh`.
-  OtherRobot(ros::NodeHandle& nh, const std::string& robot, Places places) : robot_(robot), places_(std::move(places)) {
+  OtherRobot(ros::NodeHandle& nh, const std::string& robot, SharedSession& ours, PlacePublisher& publisher, Warn warn)
+      : robot_(robot), ours_(ours), publisher_(publisher), warn_(std::move(warn)) {
     using Request = stereo_descriptor_vo::PlaceRequest;
     constexpr int kQueue = 20;
     requests_ = nh.advertise<Request>("other/place_request", kQueue);
@@ -66,7 +61,8 @@ class OtherRobot {
     if (signature.robot == robot_)
       throw std::invalid_argument("it has this robot's name: `other` is this robot's namespace, or set robot_name");
     giveUpWhatIsLate();
-    std::vector<PlaceCandidate> candidates = places_.find(signature);
+    const std::lock_guard<std::mutex> lock(ours_.mutex);
+    std::vector<PlaceCandidate> candidates = ours_.session->find(signature);
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
                                     [](const PlaceCandidate& candidate) { return candidate.score < kLeastScore; }),
                      candidates.end());
@@ -79,14 +75,15 @@ class OtherRobot {
     request.requested_by = robot_;
     requests_.publish(request);
   } catch (const std::exception& e) {
-    places_.warn("key frame of " + signature.robot + " skipped: " + e.what(), e.what());
+    warn_("key frame of " + signature.robot + " skipped: " + e.what(), e.what());
   }
 
   void onRequest(const stereo_descriptor_vo::PlaceRequest& request) try {
     if (request.robot != robot_) return;
-    if (const std::optional<PlaceMessage> place = places_.get(static_cast<int>(request.id))) answers_.publish(*place);
+    const std::lock_guard<std::mutex> lock(ours_.mutex);
+    if (const auto place = ours_.session->message(static_cast<int>(request.id), robot_)) answers_.publish(*place);
   } catch (const std::exception& e) {
-    places_.warn("key frame " + std::to_string(request.id) + " is not sent: " + e.what(), e.what());
+    warn_("key frame " + std::to_string(request.id) + " is not sent: " + e.what(), e.what());
   }
 
   void onAnswer(const PlaceMessage& answer) try {
@@ -95,16 +92,17 @@ class OtherRobot {
     const Question question = std::move(asked->second);
     questions_.erase(asked);
     const Place other = ros_conversions::fromMessage(answer);
+    const std::lock_guard<std::mutex> lock(ours_.mutex);
     for (const PlaceCandidate& candidate : question.candidates) {
-      std::optional<stereo_descriptor_vo::PlaceMatch> match = places_.verify(candidate.place, other);
+      auto match = ours_.session->verify(candidate.place, other);
       if (!match) continue;
       match->robot = robot_;
       match->other_robot = answer.robot;
-      places_.publish(*match);
+      publisher_.publish(*match);
       return;
     }
   } catch (const std::exception& e) {
-    places_.warn("key frame of " + answer.robot + " skipped: " + e.what(), e.what());
+    warn_("key frame of " + answer.robot + " skipped: " + e.what(), e.what());
   }
 
   void giveUpWhatIsLate() {
@@ -113,8 +111,8 @@ class OtherRobot {
       const auto next = std::next(question);
       if (now > question->second.deadline) {
         const std::string& robot = question->first.first;
-        places_.warn("key frame of " + robot + " skipped: it gives no answer on " + subscribers_[1].getTopic(),
-                     "no answer of " + robot);
+        warn_("key frame of " + robot + " skipped: it gives no answer on " + subscribers_[1].getTopic(),
+              "no answer of " + robot);
         questions_.erase(question);
       }
       question = next;
@@ -122,7 +120,9 @@ class OtherRobot {
   }
 
   const std::string robot_;
-  const Places places_;
+  SharedSession& ours_;
+  PlacePublisher& publisher_;
+  const Warn warn_;
   std::map<std::pair<std::string, std::uint32_t>, Question> questions_;  ///< by robot and place
   ros::Publisher requests_, answers_;
   std::vector<ros::Subscriber> subscribers_;

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -223,6 +225,12 @@ class PlaceSession {
     double radius;
   };
   std::optional<Expectation> expected_;
+};
+
+/// The session of a nodelet, which services replace.
+struct SharedSession {
+  std::mutex mutex;
+  std::shared_ptr<PlaceSession> session;  ///< it and all in it: under the mutex
 };
 
 }  // namespace sdvo
