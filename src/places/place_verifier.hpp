@@ -29,12 +29,10 @@ class PlaceVerifier {
       match.reason = text(0, "only ", match.matches, " matches");
       return match;
     }
-
     if (!motion.success) {
       match.reason = motion.reason;
       return match;
     }
-
     std::vector<int> indices;
     for (const int i : motion.inliers) indices.push_back(matches[i].current);
     match.inliers = static_cast<int>(indices.size());

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "../../src/ros/transforms/transforms.hpp"
+#include "../../src/ros/transforms/camera_mount.hpp"
 #include "../said.hpp"
 #include "spin.hpp"
 

@@ -28,7 +28,7 @@
 #include "../places/place_session.hpp"
 #include "../publishers/place_publisher.hpp"
 #include "../synchronisation/odometry_pair_input.hpp"
-#include "../transforms/transforms.hpp"
+#include "../transforms/camera_mount.hpp"
 #include "robot_nodelet.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 

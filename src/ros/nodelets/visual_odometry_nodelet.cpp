@@ -30,6 +30,7 @@
 #include "../node/throttles.hpp"
 #include "../publishers/odometry_publisher.hpp"
 #include "../transforms/axes_watch.hpp"
+#include "../transforms/camera_mount.hpp"
 #include "../transforms/guess_input.hpp"
 #include "../transforms/odometry_frames.hpp"
 #include "../transforms/start_pose.hpp"

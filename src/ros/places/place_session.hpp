@@ -71,7 +71,6 @@ class PlaceSession {
       located_ = false;
       pose_given_ = true;
     }
-
     CameraMotion motion;
     motion.T_odom_camera = T_odom_base * T_base_camera;
     motion.continuous = continues_ && last_ && pair.info->session == last_->session &&
@@ -82,7 +81,6 @@ class PlaceSession {
       motion.covariance = ros_conversions::toMotionCovariance(*pair.odometry, dt, T_base_camera);
       motion.velocity = logSE3((last_->T_odom_base * T_base_camera).inverse() * motion.T_odom_camera) / dt;
     }
-
     std::optional<PlaceReport> report = recognition_.observe(features, motion);
     last_ = {stamp, pair.info->session, pair.info->epoch, pair.resumes, features.camera, T_odom_base};
     continues_ = true;

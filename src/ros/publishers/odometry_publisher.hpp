@@ -70,7 +70,6 @@ class OdometryPublisher {
             boost::make_shared<nav_msgs::Odometry>(ros_conversions::toNullOdometry(stamp, frames_)));
       return;
     }
-
     const auto odometry = boost::make_shared<nav_msgs::Odometry>(
         ros_conversions::toOdometry(result, T_base_camera, frames_, T_odom_start_));
     // TF first: whoever acts on the odometry finds the transform there.
@@ -85,20 +84,25 @@ class OdometryPublisher {
     pose->header = odometry->header;
     pose->pose = odometry->pose;
     pose_publisher_.publish(pose);
-    extendPath(*odometry);
-    if (error_publisher_) without_truth_.push_back({stamp, odometry->pose.pose});
+    geometry_msgs::PoseStamped kept;
+    kept.header = odometry->header;
+    kept.pose = odometry->pose.pose;
+    if (error_publisher_) without_truth_.push_back(kept);
+    const std::lock_guard<std::mutex> lock(path_mutex_);
+    path_.push_back(kept);  // in the place of the oldest once it is full
+    path_changed_ = true;
   }
   /// Errors of the last poses, whose truth may come later than they do. `truth`: T_odom_base at a time, where it is
   /// known.
   void publishErrors(const std::function<std::optional<Eigen::Isometry3d>(const ros::Time&)>& truth) {
     while (!without_truth_.empty()) {
-      const auto T_odom_base = truth(without_truth_.front().stamp);
+      const auto T_odom_base = truth(without_truth_.front().header.stamp);
       if (!T_odom_base && without_truth_.size() <= kMostWithoutTruth) return;
       if (T_odom_base) {
         Eigen::Isometry3d T_odom_found;
         tf2::fromMsg(without_truth_.front().pose, T_odom_found);
         geometry_msgs::PoseStamped error;
-        error.header.stamp = without_truth_.front().stamp;
+        error.header.stamp = without_truth_.front().header.stamp;
         error.header.frame_id = frames_.base;
         error.pose = tf2::toMsg(T_odom_base->inverse() * T_odom_found);
         error_publisher_.publish(error);
@@ -161,40 +165,20 @@ class OdometryPublisher {
     path_.clear();
   }
 
-  static constexpr std::size_t kLongestPath = 20'000;  ///< poses: at 30 Hz eleven minutes, 1.3 MB
+  static constexpr std::size_t kLongestPath = 20'000;  ///< poses: at 30 Hz eleven minutes, 2 MB
   /// The poses since the last reset, the newest `kLongestPath` of them. From any thread.
   nav_msgs::Path path() const {
     const std::lock_guard<std::mutex> lock(path_mutex_);
     nav_msgs::Path message;
     message.header.frame_id = frames_.odom;
-    if (!path_.empty()) message.header.stamp = path_.back().stamp;
-    message.poses.reserve(path_.size());
-    geometry_msgs::PoseStamped pose;
-    pose.header.frame_id = frames_.odom;
-    for (const PathPose& kept : path_) {
-      pose.header.stamp = kept.stamp;
-      pose.pose = kept.pose;
-      message.poses.push_back(pose);
-    }
-
+    if (!path_.empty()) message.header.stamp = path_.back().header.stamp;
+    message.poses.assign(path_.begin(), path_.end());
     return message;
   }
 
  private:
-  /// A pose of the path without a header, which would take most of the memory.
-  struct PathPose {
-    ros::Time stamp;
-    geometry_msgs::Pose pose;
-  };
-
   static constexpr double kPathPeriod = 1.0;            // s of wall time
   static constexpr std::size_t kMostWithoutTruth = 10;  // poses (chosen)
-
-  void extendPath(const nav_msgs::Odometry& odometry) {
-    const std::lock_guard<std::mutex> lock(path_mutex_);
-    path_.push_back({odometry.header.stamp, odometry.pose.pose});  // in the place of the oldest once it is full
-    path_changed_ = true;
-  }
 
   OdometryOutputOptions options_;
   ros_conversions::OdometryFrames frames_;
@@ -203,10 +187,10 @@ class OdometryPublisher {
       points_publisher_, flow_publisher_;
   TransformPublisher transform_publisher_;
   Eigen::Isometry3d T_odom_start_ = Eigen::Isometry3d::Identity();
-  std::optional<Eigen::Isometry3d> T_odom_guess_;  ///< at the last pose
-  std::deque<PathPose> without_truth_;             ///< the last poses
+  std::optional<Eigen::Isometry3d> T_odom_guess_;         ///< at the last pose
+  std::deque<geometry_msgs::PoseStamped> without_truth_;  ///< the last poses
   mutable std::mutex path_mutex_;
-  boost::circular_buffer<PathPose> path_;
+  boost::circular_buffer<geometry_msgs::PoseStamped> path_;
   std::atomic<bool> path_changed_{false};  ///< since it was published
   ros::WallTimer path_timer_;
 };

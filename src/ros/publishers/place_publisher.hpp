@@ -107,7 +107,6 @@ class PlacePublisher {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (!std::exchange(changed_, false)) return;
     }
-
     const Map map = map_();
     if (loops_wanted)
       loops_publisher_.publish(

@@ -90,7 +90,8 @@ Finding explainMissing(const std::string& base_frame, const std::string& camera_
   return {Verdict::kFail,
           missing + "the link " + last + " -> " + root + " is missing (TF has " +
               (has_base ? "" : "no '" + base_frame + "' and ") +
-              (is_optical ? "nothing above '" + camera_frame + "'" : "'" + camera_frame + "' below '" + root + "'") + ")",
+              (is_optical ? "nothing above '" + camera_frame + "'" : "'" + camera_frame + "' below '" + root + "'") +
+              ")",
           "let the robot's URDF or the camera's driver publish it. For a camera that looks ahead: rosrun tf2_ros "
           "static_transform_publisher 0 0 0 " +
               std::string(is_optical ? "-0.5 0.5 -0.5 0.5 " : "0 0 0 ") + last + " " + root +
@@ -147,7 +148,8 @@ void RobotTransforms::receive(const Event& event, bool is_static) {
   for (const geometry_msgs::TransformStamped& transform : event.getMessage()->transforms) try {
       const bool is_timeless = transform.header.stamp.isZero();
       if (!is_timeless && !whyUnusable(transform.header.stamp).empty()) continue;
-      if (const double ahead = secondsBetween(now, transform.header.stamp); !now.isZero() && !is_static && ahead > kAhead)
+      if (const double ahead = secondsBetween(now, transform.header.stamp);
+          !now.isZero() && !is_static && ahead > kAhead)
         throw std::invalid_argument(text(1, "its stamp is ", ahead, " s ahead of this machine's clock"));
       buffer_.setTransform(transform, publisher, is_static);
       watch(transform, publisher);
@@ -184,60 +186,6 @@ std::string RobotTransforms::explainMissing(const std::string& base_frame, const
   if (ours && camera_frame == ours->odom)
     return "the left images' frame_id is '" + camera_frame + "', as odom_frame_id: " + kSetFrame;
   return sdvo::explainMissing(base_frame, camera_frame, buffer_).text();
-}
-
-void CameraMount::await(const std::string& base_frame, const std::string& camera_frame,
-                        const std::function<bool()>& is_urgent) {
-  const ros::SteadyTime now = ros::SteadyTime::now();
-  std::unique_lock<std::mutex> lock(mutex_);
-  if (!deadline_) deadline_ = now + ros::WallDuration(timeout_);
-  const ros::SteadyTime deadline = *deadline_;
-  lock.unlock();
-  std::string ignored;
-  while (!knows(base_frame, camera_frame) && !transforms_.find(base_frame, camera_frame, ignored) &&
-         ros::SteadyTime::now() < deadline && !is_urgent() && ros::ok())
-    ros::WallDuration(0.01).sleep();
-}
-
-std::optional<Eigen::Isometry3d> CameraMount::find(const std::string& base_frame, const std::string& camera_frame,
-                                                   std::string& problem) {
-  if (knows(base_frame, camera_frame)) return last();
-  const std::optional<Eigen::Isometry3d> found = transforms_.find(base_frame, camera_frame, problem);
-  if (!found) return std::nullopt;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  base_frame_ = base_frame;
-  camera_frame_ = camera_frame;
-  change_reported_ = false;
-  return T_base_camera_ = found;
-}
-
-std::string CameraMount::change() {
-  constexpr double kNear = 0.005, kAlike = 0.5 * M_PI / 180.0;  // m, rad: more than a mast bends (chosen)
-  std::string ignored;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (change_reported_ || camera_frame_.empty()) return "";
-  const std::optional<Eigen::Isometry3d> now = transforms_.find(base_frame_, camera_frame_, ignored);
-  if (!now) return "";
-  const Eigen::Isometry3d moved = T_base_camera_->inverse() * *now;
-  const double way = moved.translation().norm(), angle = Eigen::AngleAxisd(moved.linear()).angle();
-  if (way <= kNear && angle <= kAlike) return "";
-  change_reported_ = true;
-  return text(3, base_frame_, " -> ", camera_frame_, " has changed by ", way, " m and ", 180.0 / M_PI * angle, " deg");
-}
-
-bool CameraMount::knows(const std::string& base_frame, const std::string& camera_frame) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return T_base_camera_ && base_frame == base_frame_ && camera_frame == camera_frame_;
-}
-
-void CameraMount::forget() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  camera_frame_.clear();
-}
-
-std::optional<Eigen::Isometry3d> CameraMount::last() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return T_base_camera_;
 }
 
 }  // namespace sdvo

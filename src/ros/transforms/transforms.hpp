@@ -69,45 +69,6 @@ class RobotTransforms {
   ros::Subscriber dynamic_, static_;
 };
 
-/// The camera's pose on the robot, by TF. It is read once for each camera, until forget(): a change would move the
-/// odometry's origin. For any thread.
-class CameraMount {
- public:
-  /// `timeout`: s of wall time from the first await() on, after which none waits (chosen: launch files start all nodes
-  /// within it).
-  explicit CameraMount(const RobotTransforms& transforms, double timeout = 2.0)
-      : transforms_(transforms), timeout_(timeout) {}
-
-  /// Waits until TF has the transform, the timeout, or `is_urgent`: static transforms may come after the first
-  /// features. Hold no lock meanwhile that others need.
-  void await(const std::string& base_frame, const std::string& camera_frame, const std::function<bool()>& is_urgent);
-
-  /// T_base_camera. None, with the `problem`, while TF has no such transform. Frame ids without a leading slash.
-  std::optional<Eigen::Isometry3d> find(const std::string& base_frame, const std::string& camera_frame,
-                                        std::string& problem);
-
-  /// Whether find() returned this transform already.
-  bool knows(const std::string& base_frame, const std::string& camera_frame) const;
-
-  /// How the transform on TF differs by now from find()'s, in words. Empty if it does not, or was reported already.
-  std::string change();
-
-  /// The next find() reads TF again.
-  void forget();
-
-  /// Result of the last find() that succeeded.
-  std::optional<Eigen::Isometry3d> last() const;
-
- private:
-  const RobotTransforms& transforms_;
-  const double timeout_;
-  mutable std::mutex mutex_;  // of what follows
-  std::optional<ros::SteadyTime> deadline_;
-  std::string base_frame_, camera_frame_;
-  bool change_reported_ = false;
-  std::optional<Eigen::Isometry3d> T_base_camera_;
-};
-
 /// Publishes on /tf with the nodelet's remappings; tf2_ros' broadcaster has the manager's. All nodelets of a manager
 /// have one name on TF, so that transforms carry a tag as `seq`, which nobody else reads, to tell them apart.
 class TransformPublisher {
