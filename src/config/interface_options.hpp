@@ -90,8 +90,6 @@ struct OdometryOutputOptions {
   bool overwrite = false;
   double max_silence = 2.0;  ///< s of wall time without features, which /diagnostics call an error (chosen)
   RateOptions rates;
-  double max_load = 0.9;     ///< of one processor: /diagnostics warn beyond it (chosen)
-  double max_latency = 0.5;  ///< s, of poses after their images (chosen)
 
   /// Whether TF gets odom -> guess_frame_id, for base has that odometry's parent.
   bool correctsGuess() const { return publish_tf && !invert_tf && !guess_frame_id.empty(); }
