@@ -143,7 +143,9 @@ class VisualOdometryNodelet : public RobotNodelet {
   void onFeatures(const FeaturesMessagePtr& message) try {
     if (input_->isPaused()) return;
     const std::uint64_t now = ros::Time::isSimTime() ? ros::Time::now().toNSec() : ros::SteadyTime::now().toNSec();
-    Arrived arrived{message, check(*message), static_cast<std::int64_t>(now), starts_, resumes_.posted()};
+    const std::string problem = whyUnusable(message->header.stamp);
+    if (!problem.empty()) throw std::invalid_argument(problem);
+    Arrived arrived{message, StereoFeaturesView(*message), static_cast<std::int64_t>(now), starts_, resumes_.posted()};
     const std::uint64_t late = filter_.dropped();
     const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
     std::vector<FeaturesFilter::Passed> passed =
@@ -164,17 +166,8 @@ class VisualOdometryNodelet : public RobotNodelet {
                                          << filter_.dropped()
                                          << " so far); if this goes on, check the driver's stamps");
   } catch (const std::exception& e) {
-    SDVO_ERROR(e.what(), "features at " << message->header.stamp << " skipped: " << e.what());
-  }
-
-  /// Throws for a message that cannot be used, before filter_ takes its stamp.
-  StereoFeaturesView check(const FeaturesMessage& message) try {
-    const std::string problem = whyUnusable(message.header.stamp);
-    if (!problem.empty()) throw std::invalid_argument(problem);
-    return StereoFeaturesView(message);
-  } catch (const std::invalid_argument&) {
     unused_->add(UnusedInput::kRefused);
-    throw;
+    SDVO_ERROR(e.what(), "features at " << message->header.stamp << " skipped: " << e.what());
   }
 
   /// In the worker's thread.
