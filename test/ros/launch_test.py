@@ -267,6 +267,9 @@ class Launch(unittest.TestCase):
             for path in (pipe, large, torn):
                 with self.assertRaisesRegex(roslaunch.core.RLException, os.path.basename(path)):
                     load('odometry.launch', config=path)
+            with open(torn, 'w') as config:
+                config.write('stereo_features: {detector: {max_features: 400}}')
+            load('odometry.launch', config=torn)
         self.assertEqual(copies() - before, set())
 
     def test_arguments_that_a_file_lacks_are_refused(self):
