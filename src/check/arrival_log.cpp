@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <vector>
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <vector>
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"

@@ -1,6 +1,5 @@
 #include "row_check.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
