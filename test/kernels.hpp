@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "../src/common/processor.hpp"
+#include "../src/common/kernel.hpp"
 
 namespace sdvo {
 

@@ -5,6 +5,7 @@
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
 
@@ -16,7 +17,7 @@ void OdometryCheck::add(const OdometryResult& result) {
   if (std::isfinite(result.readout)) readout_ = {result.readout, result.readout_sigma};
   if (!result.has_motion) return;
   inliers_.push_back(result.inliers);
-  rotations_.push_back(Eigen::AngleAxisd(result.T_previous_current.rotation()).angle() * 180.0 / EIGEN_PI);
+  rotations_.push_back(degreesOf(result.T_previous_current.linear()));
 }
 
 Finding OdometryCheck::judge() const {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "processor.hpp"
+#include <atomic>
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define SDVO_HAVE_AVX2
@@ -15,6 +15,32 @@
 #define SDVO_IN_KERNEL inline __attribute__((always_inline))
 
 namespace sdvo {
+
+// The kernels that take most of the time are compiled twice: for any processor, and for AVX2. Those by intrinsics have
+// a plain form beside them. One of both is chosen at run time, and both give the same bits: sums are added in a fixed
+// order, and no product is fused with a sum.
+
+/// Whether this processor has the vectors that kernels use. All 64-bit ARM processors have NEON, not all of x86 AVX2.
+inline bool processorHasVectors() {
+#ifdef SDVO_HAVE_AVX2
+  return __builtin_cpu_supports("avx2");
+#elif defined(SDVO_HAVE_NEON)
+  return true;
+#else
+  return false;
+#endif
+}
+
+inline std::atomic<bool> vector_kernels_in_use{processorHasVectors()};
+
+inline bool usesVectorKernels() {
+  return vector_kernels_in_use.load(std::memory_order_relaxed);
+}
+
+/// False: plain kernels from now on. True: vectors again, if the processor has them. For tests and benchmarks.
+inline void allowVectorKernels(bool allowed) {
+  vector_kernels_in_use = allowed && processorHasVectors();
+}
 
 #ifdef SDVO_HAVE_AVX2
 template <class Kernel, class... Arguments>

@@ -98,24 +98,6 @@ bool Option::clamp() {
   return false;
 }
 
-void OptionList::add(const std::string& name, bool& value, const std::string& meaning) {
-  options_.push_back({prefix_ + name, &value, {}, {}, "", meaning});
-}
-
-void OptionList::add(const std::string& name, int& value, Range range, const std::string& unit,
-                     const std::string& meaning) {
-  options_.push_back({prefix_ + name, &value, range, {}, unit, meaning});
-}
-
-void OptionList::add(const std::string& name, double& value, Range range, const std::string& unit,
-                     const std::string& meaning) {
-  options_.push_back({prefix_ + name, &value, range, {}, unit, meaning});
-}
-
-void OptionList::add(const std::string& name, std::string& value, const std::string& meaning) {
-  options_.push_back({prefix_ + name, &value, {}, {}, "", meaning});
-}
-
 void OptionList::check() const {
   for (const Option& option : options_) option.check();
   for (const ComponentCheck& component : checks_) try {

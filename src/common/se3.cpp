@@ -25,6 +25,10 @@ Eigen::Vector3d logSO3(const Eigen::Matrix3d& rotation) {
   return angle_axis.angle() * angle_axis.axis();
 }
 
+double degreesOf(const Eigen::Matrix3d& rotation) {
+  return 180.0 / M_PI * Eigen::AngleAxisd(rotation).angle();
+}
+
 Eigen::Matrix3d leftJacobianSO3(const Eigen::Vector3d& phi) {
   const double angle = phi.norm();
   const Eigen::Matrix3d w = skew(phi);

@@ -6,10 +6,6 @@
 namespace sdvo {
 namespace {
 
-int bytesOf(ElementType type) {
-  return type == ElementType::kFloat32 ? 4 : 1;
-}
-
 cv::Mat selectRows(const cv::Mat& matrix, const std::vector<int>& rows) {
   cv::Mat selected(static_cast<int>(rows.size()), matrix.cols, matrix.type());
   for (std::size_t k = 0; k < rows.size(); ++k) matrix.row(rows[k]).copyTo(selected.row(static_cast<int>(k)));
@@ -73,7 +69,8 @@ void StereoFeatures::check() const {
       refuse(name + " (rows) has " + std::to_string(matrix.rows) + " elements, u has " + std::to_string(count()));
   };
   requireRows(descriptors, "descriptors");
-  if (count() > 0 && (descriptors.type() != CV_8U || descriptors.cols % bytesOf(element_type) != 0))
+  const int bytes = element_type == ElementType::kFloat32 ? 4 : 1;
+  if (count() > 0 && (descriptors.type() != CV_8U || descriptors.cols % bytes != 0))
     refuse("descriptors are not rows of whole elements: " + toString(kind()));
   constexpr double kOtherPair = 1.0;  // s (chosen): images further apart are of two pairs
   if (!(std::abs(right_delay) <= kOtherPair)) refuse("right_delay is not a time of at most 1 s");

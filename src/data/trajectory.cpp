@@ -12,12 +12,12 @@
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
 #include "text_file.hpp"
 
 namespace sdvo {
 namespace {
 
-constexpr double kDegreesPerRadian = 180.0 / M_PI;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Rounding that a sub-path may lack of its length.
@@ -28,12 +28,6 @@ constexpr double kSmallestStep = 1e-3;  // m
 
 /// Tolerance on rows of rotations and quaternions in files, which may have been written with four decimals.
 constexpr double kRotationTolerance = 1e-3;
-
-double rotationAngle(const Eigen::Matrix3d& rotation) {
-  // The quaternion keeps full precision for small angles, where the devkit's acos of the trace loses half of the
-  // digits.
-  return Eigen::Quaterniond(rotation).angularDistance(Eigen::Quaterniond::Identity());
-}
 
 /// Error of the motion between two frames, in the frame of the true later pose.
 Eigen::Isometry3d motionError(const Trajectory& ground_truth, const Trajectory& estimate, std::size_t first,
@@ -362,7 +356,7 @@ std::vector<SubPathErrors> subPathErrors(const Trajectory& ground_truth, const T
       const std::size_t last = static_cast<std::size_t>(end - distances.begin());
       const Eigen::Isometry3d error = motionError(ground_truth, estimate, first, last);
       sums.translation_percent += 100.0 * error.translation().norm() / length;
-      sums.rotation_deg_per_m += kDegreesPerRadian * rotationAngle(error.linear()) / length;
+      sums.rotation_deg_per_m += degreesOf(error.linear()) / length;
       ++sums.count;
     }
     all.count += sums.count;
@@ -392,7 +386,7 @@ TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajec
   for (std::size_t i = 1; i < estimate.size(); ++i) {
     const Eigen::Isometry3d error = motionError(truth, estimate, i - 1, i);
     squared_translation += error.translation().squaredNorm();
-    squared_rotation += std::pow(kDegreesPerRadian * rotationAngle(error.linear()), 2);
+    squared_rotation += std::pow(degreesOf(error.linear()), 2);
   }
   errors.rpe_translation_m = std::sqrt(squared_translation / steps);
   errors.rpe_rotation_deg = std::sqrt(squared_rotation / steps);
@@ -410,7 +404,7 @@ TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajec
   errors.final_drift_percent = errors.path_length > 0.0 ? 100.0 * errors.final_drift_m / errors.path_length : kNaN;
   for (std::size_t i = 0; i < estimate.size(); ++i) {
     const Eigen::Isometry3d error = motionError(truth, estimate, 0, i);
-    errors.final_drift_deg = kDegreesPerRadian * rotationAngle(error.linear());
+    errors.final_drift_deg = degreesOf(error.linear());
     errors.largest_drift_m = std::max(errors.largest_drift_m, error.translation().norm());
     errors.largest_drift_deg = std::max(errors.largest_drift_deg, errors.final_drift_deg);
   }

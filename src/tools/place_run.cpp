@@ -1,6 +1,5 @@
 #include "place_run.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <ctime>
 #include <map>
@@ -13,17 +12,9 @@
 #include "../common/stopwatch.hpp"
 #include "../common/text.hpp"
 #include "../data/text_file.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
-namespace {
-
-constexpr double kDegree = 180.0 / 3.14159265358979323846;
-
-double angle(const Eigen::Isometry3d& T) {
-  return Eigen::AngleAxisd(T.linear()).angle() * kDegree;
-}
-
-}  // namespace
 
 void PlaceRun::process(const StereoFeatures& features, const OdometryResult& odometry) {
   const int number = static_cast<int>(pairs_.size() - first_pair_);
@@ -77,7 +68,7 @@ bool PlaceRun::isRevisit(const Trajectory& truth, const Keyframe& keyframe) cons
         here.travelled - place.travelled < options_.min_travel)
       return false;
     const Eigen::Isometry3d T = truth[other.pair].inverse() * truth[keyframe.pair];
-    return T.translation().norm() <= kNear && angle(T) <= kSameDirection;
+    return T.translation().norm() <= kNear && degreesOf(T.linear()) <= kSameDirection;
   });
 }
 
@@ -101,9 +92,10 @@ PlaceErrors PlaceRun::errors(const Trajectory& truth) const {
     recognised.insert(edge.to);
     const Eigen::Isometry3d T_true = truth[pair_of.at(edge.from)].inverse() * truth[pair_of.at(edge.to)];
     const Eigen::Isometry3d error = T_true.inverse() * edge.T_from_to;
-    errors.false_loops += error.translation().norm() > kWrong || angle(error) > kWrongAngle;
+    const double turn = degreesOf(error.linear());
+    errors.false_loops += error.translation().norm() > kWrong || turn > kWrongAngle;
     errors.worst_translation = std::max(errors.worst_translation, error.translation().norm());
-    errors.worst_rotation = std::max(errors.worst_rotation, angle(error));
+    errors.worst_rotation = std::max(errors.worst_rotation, turn);
   }
   for (auto keyframe = ownKeyframes(); keyframe != keyframes_.end(); ++keyframe) {
     if (!isRevisit(truth, *keyframe)) continue;

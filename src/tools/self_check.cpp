@@ -5,10 +5,10 @@
 #include <sstream>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/se3.hpp"
+
 namespace sdvo {
 namespace {
-
-constexpr double kDegreesPerRadian = 180.0 / M_PI;
 
 /// Length of a sub-path as a ratio of the distance: the mean is over at least ten sub-paths that do not overlap.
 constexpr double kSubPath = 0.1;
@@ -26,7 +26,7 @@ std::string whyIncomplete(const OfflineRun& run, const std::string& name) {
 
 void setEnd(SelfCheck& check, const Eigen::Isometry3d& T_one_other) {
   check.end_m = T_one_other.translation().norm();
-  check.end_deg = kDegreesPerRadian * Eigen::AngleAxisd(T_one_other.linear()).angle();
+  check.end_deg = degreesOf(T_one_other.linear());
 }
 
 /// All fields but end_m and end_deg.

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "../../src/common/processor.hpp"
+#include "../../src/common/kernel.hpp"
 #include "../../src/map/window_optimizer.hpp"
 #include "../synthetic_features.hpp"
 

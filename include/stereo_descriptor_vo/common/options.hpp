@@ -52,17 +52,22 @@ struct Option {
 /// `void check() const` that throws std::invalid_argument if its fields contradict each other.
 class OptionList {
  public:
-  void add(const std::string& name, bool& value, const std::string& meaning);
-  void add(const std::string& name, int& value, Range range, const std::string& unit, const std::string& meaning);
-  void add(const std::string& name, double& value, Range range, const std::string& unit, const std::string& meaning);
-  void add(const std::string& name, std::string& value, const std::string& meaning);
-  /// An enum with names, see named_enum.hpp.
-  template <class Enum, class = decltype(namesOf(Enum{}))>
-  void add(const std::string& name, Enum& value, const std::string& meaning) {
-    const ChoiceReference reference{&value,
-                                    [](const void* v) { return static_cast<int>(*static_cast<const Enum*>(v)); },
-                                    [](void* v, int choice) { *static_cast<Enum*>(v) = static_cast<Enum>(choice); }};
-    options_.push_back({prefix_ + name, reference, {}, namesOf(value), "", meaning});
+  /// A number: an int or a double.
+  template <class Number>
+  void add(const std::string& name, Number& value, Range range, const std::string& unit, const std::string& meaning) {
+    options_.push_back({prefix_ + name, &value, range, {}, unit, meaning});
+  }
+  /// A bool, a text, or an enum with names, see named_enum.hpp.
+  template <class Value>
+  void add(const std::string& name, Value& value, const std::string& meaning) {
+    if constexpr (std::is_enum_v<Value>) {
+      const ChoiceReference reference{
+          &value, [](const void* v) { return static_cast<int>(*static_cast<const Value*>(v)); },
+          [](void* v, int choice) { *static_cast<Value*>(v) = static_cast<Value>(choice); }};
+      options_.push_back({prefix_ + name, reference, {}, namesOf(value), "", meaning});
+    } else {
+      options_.push_back({prefix_ + name, &value, {}, {}, "", meaning});
+    }
   }
 
   /// A component's fields under its name.

@@ -13,6 +13,8 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 Eigen::Matrix3d skew(const Eigen::Vector3d& w);
 Eigen::Matrix3d expSO3(const Eigen::Vector3d& w);
 Eigen::Vector3d logSO3(const Eigen::Matrix3d& rotation);
+/// The angle of a rotation, deg from 0 to 180.
+double degreesOf(const Eigen::Matrix3d& rotation);
 
 /// The left Jacobian V of SO(3): exp((rho, phi)) has the translation V(phi) * rho (Barfoot, State Estimation,
 /// eq. 7.86).

@@ -5,7 +5,7 @@
 #include <opencv2/core/utility.hpp>
 #include <string>
 
-#include "../../../src/common/processor.hpp"
+#include "../../../src/common/kernel.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "../../../src/common/processor.hpp"
+#include "../../../src/common/kernel.hpp"
 #include "../../../src/front_end/fast_corners.hpp"
 #include "../../../src/front_end/freak.hpp"
 #include "../../../src/front_end/stereo_matcher.hpp"
