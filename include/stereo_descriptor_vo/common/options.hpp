@@ -66,6 +66,7 @@ class OptionList {
           [](void* v, int choice) { *static_cast<Value*>(v) = static_cast<Value>(choice); }};
       options_.push_back({prefix_ + name, reference, {}, namesOf(value), "", meaning});
     } else {
+      static_assert(std::is_same_v<Value, bool> || std::is_same_v<Value, std::string>, "a number has a range");
       options_.push_back({prefix_ + name, &value, {}, {}, "", meaning});
     }
   }
