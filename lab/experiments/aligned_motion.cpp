@@ -12,13 +12,13 @@ namespace {
 std::optional<Eigen::Vector2d> findShift(const StereoFeatures& reference, const StereoFeatures& current,
                                          const FeatureMatch& match, PatchWarp warp,
                                          const Eigen::Isometry3d& T_current_reference) {
-  const PatchAlignmentOptions options;
+  const NoiseOptions noise;
   if (warp == PatchWarp::kNone) {
     const auto patchOf = [](const StereoFeatures& features, int feature) {
       return Patch{features.patches.ptr(feature), features.patch_layout.side,
                    features.patch_layout.spacing(features.size[feature])};
     };
-    const auto found = alignPatch(options, patchOf(reference, match.reference), Eigen::Vector2f::Zero(),
+    const auto found = alignPatch(noise, patchOf(reference, match.reference), Eigen::Vector2f::Zero(),
                                   patchOf(current, match.current), Eigen::Matrix2f::Identity());
     return found ? std::optional<Eigen::Vector2d>(found->shift.cast<double>()) : std::nullopt;
   }
@@ -27,7 +27,7 @@ std::optional<Eigen::Vector2d> findShift(const StereoFeatures& reference, const 
   const AnchoredPoint point{Eigen::Isometry3d::Identity(), {p.x() / p.z(), p.y() / p.z(), 1.0 / p.z()}};
   ReferencePatch patch;
   patch.take(reference, match.reference, corner, Eigen::Isometry3d::Identity());
-  const auto found = patch.findIn(options, current, match.current, T_current_reference, point);
+  const auto found = patch.findIn(noise, current, match.current, T_current_reference, point);
   return found ? std::optional<Eigen::Vector2d>(found->shift) : std::nullopt;
 }
 

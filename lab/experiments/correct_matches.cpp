@@ -9,7 +9,6 @@ namespace sdvo {
 
 std::vector<FeatureMatch> matchByDescriptor(const StereoFeatures& reference, const StereoFeatures& current) {
   FeatureMatcherOptions options;
-  options.gating = false;
   options.max_distance = 1.0;
   return FeatureMatcher(options).match(reference, current, std::nullopt);
 }

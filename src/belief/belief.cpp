@@ -1,6 +1,5 @@
 #include "belief.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -61,29 +60,23 @@ void Doubt::fade(double seconds) {
   if (!lasts()) distance_ = angle_ = largest_ = 0.0;
 }
 
-/// `deviation`: second moment of the motion's error if it is wrong.
-Doubt::Alternatives Doubt::alternatives(const MotionScene& scene, const MotionHypothesis& found,
-                                        const std::vector<Evidence>& evidence, const Matrix6d& deviation) const {
-  Alternatives result{{}, std::min(-sdvo::logOdds(found.probability), kCertain), logOddsWrong(found)};
-  MotionMixture& mixture = result.mixture;
-  // The moment of the rivals is found.rivals_moment.
-  mixture.add({result.log_odds_rivals, Matrix6d::Zero(), rivalWords(scene, found)});
-  mixture.add({result.log_odds_wrong, deviation, innovationWords(found) + ": followed is something else"});
-  for (const Evidence& each : evidence)
-    if (each.log_odds > kUnsuspected) mixture.add({logExcess(each.log_odds), deviation, each.cause});
-  mixture.add({log_odds_, deviation, "a moment ago " + cause_});
-  return result;
-}
-
 Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
   // Lasting points that agree refute the doubt of earlier pairs.
   if (lasts()) log_odds_ = std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain);
 
-  // Without a prior, the deviation is that from standstill.
+  // Second moment of the error if the motion is wrong. Without a prior, it is that of standstill.
   const ExpectedMotion expected = scene.prior.empty() ? ExpectedMotion() : scene.prior.front();
   const Vector6d innovation = expected.innovation(found.motion.T_current_reference.inverse());
   const Matrix6d deviation = momentOf(innovation) + expected.covariance;
-  const auto [mixture, log_odds_rivals, log_odds_wrong] = alternatives(scene, found, evidence, deviation);
+  const double log_odds_rivals = std::min(-sdvo::logOdds(found.probability), kCertain);
+  const double log_odds_wrong = logOddsWrong(found);  // without a rival
+  MotionMixture mixture;
+  // The moment of the rivals is found.rivals_moment.
+  mixture.add({log_odds_rivals, Matrix6d::Zero(), rivalWords(scene, found)});
+  mixture.add({log_odds_wrong, deviation, innovationWords(found) + ": followed is something else"});
+  for (const Evidence& each : evidence)
+    if (each.log_odds > kUnsuspected) mixture.add({logExcess(each.log_odds), deviation, each.cause});
+  mixture.add({log_odds_, deviation, "a moment ago " + cause_});
   Belief belief;
   belief.probability = mixture.probability();
   belief.moment = mixture.moment();

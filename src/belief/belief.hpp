@@ -49,16 +49,7 @@ class Doubt {
   void fade(double seconds);
 
  private:
-  /// Alternatives to a measured motion, and the log-odds of two of them.
-  struct Alternatives {
-    MotionMixture mixture;
-    double log_odds_rivals;  ///< that one of its rivals is the camera's motion
-    double log_odds_wrong;   ///< that it is wrong by its prior and lasting points, without a rival
-  };
-
   void raise(double odds, const std::string& cause);
-  Alternatives alternatives(const MotionScene& scene, const MotionHypothesis& found,
-                            const std::vector<Evidence>& evidence, const Matrix6d& deviation) const;
 
   double log_odds_ = kUnsuspected;
   std::string cause_;                    ///< that with the largest odds since the doubt began

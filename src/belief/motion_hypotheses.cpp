@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bitset>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <map>
@@ -10,7 +9,6 @@
 #include <utility>
 
 #include "../common/statistics.hpp"
-#include "../motion/motion_estimator.hpp"
 #include "../motion/pose_problem.hpp"
 
 namespace sdvo {
@@ -112,8 +110,7 @@ class Explanations {
     const PoseProblem problem(scene.features.camera, matches, threshold);
     for (const MotionHypothesis& hypothesis : hypotheses) {
       explained_.emplace_back(matches.size(), false);
-      for (const int i : problem.inliers(hypothesis.motion.T_current_reference))
-        explained_.back()[static_cast<std::size_t>(i)] = true;
+      for (const int i : problem.inliers(hypothesis.motion.T_current_reference)) explained_.back()[i] = true;
     }
   }
 
@@ -247,7 +244,7 @@ void compareWithRivals(const MotionScene& scene, const std::vector<MotionHypothe
   // Matches that rivals explain are no evidence against the chosen motion.
   explained = sorted(std::move(explained));
   for (int i = 0; i < static_cast<int>(chosen.matches.size()); ++i) {
-    const int feature = chosen.matches[static_cast<std::size_t>(i)].current;
+    const int feature = chosen.matches[i].current;
     if (!std::binary_search(explained.begin(), explained.end(), feature)) continue;
     --chosen.agreement.matches;
     chosen.agreement.lasting_matches -= chosen.isLasting(i);
@@ -289,8 +286,7 @@ PlaceBelief choosePlace(const FoundPlace& place, const std::vector<ExpectedMotio
 }
 
 int MotionHypothesis::sightingsOf(int match) const {
-  return std::min(view->seen[static_cast<std::size_t>(matches[static_cast<std::size_t>(match)].reference)],
-                  kLastingSightings);
+  return std::min(view->seen[matches[match].reference], kLastingSightings);
 }
 
 void MotionHypothesis::replaceMotion(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
@@ -388,43 +384,32 @@ double logOddsWrong(const MotionHypothesis& hypothesis) {
 }
 
 MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses) {
-  double match_time = 0.0, motion_time = 0.0;
-  for (const MotionHypothesis& hypothesis : hypotheses)
-    match_time += hypothesis.match_time, motion_time += hypothesis.motion_time;
   const auto by_inliers = [](const MotionHypothesis& a, const MotionHypothesis& b) {
     return a.motion.inliers.size() < b.motion.inliers.size();
   };
   const auto failures = std::stable_partition(hypotheses.begin(), hypotheses.end(),
                                               [](const MotionHypothesis& h) { return h.motion.success; });
-  MotionHypothesis chosen;
-  if (failures == hypotheses.begin()) {
-    // The reason of the failure with most inliers.
-    chosen = *std::max_element(hypotheses.begin(), hypotheses.end(), by_inliers);
-  } else {
-    hypotheses.erase(failures, hypotheses.end());
-    const Explanations explanations(scene, threshold, hypotheses);
-    const std::size_t likeliest = explanations.likeliest();
-    // Of the estimates of this motion the one with most inliers.
-    std::size_t largest = likeliest;
-    for (std::size_t k = 0; k < hypotheses.size(); ++k)
-      if (by_inliers(hypotheses[largest], hypotheses[k]) && explanations.areOne(likeliest, k)) largest = k;
-    chosen = hypotheses[largest];
-    compareWithRivals(scene, hypotheses, rivalsOf(threshold, hypotheses, explanations, likeliest, largest), chosen);
-  }
-  chosen.match_time = match_time, chosen.motion_time = motion_time;
+  // The reason of the failure with most inliers.
+  if (failures == hypotheses.begin()) return *std::max_element(hypotheses.begin(), hypotheses.end(), by_inliers);
+  hypotheses.erase(failures, hypotheses.end());
+  const Explanations explanations(scene, threshold, hypotheses);
+  const std::size_t likeliest = explanations.likeliest();
+  // Of the estimates of this motion the one with most inliers.
+  std::size_t largest = likeliest;
+  for (std::size_t k = 0; k < hypotheses.size(); ++k)
+    if (by_inliers(hypotheses[largest], hypotheses[k]) && explanations.areOne(likeliest, k)) largest = k;
+  MotionHypothesis chosen = hypotheses[largest];
+  compareWithRivals(scene, hypotheses, rivalsOf(threshold, hypotheses, explanations, likeliest, largest), chosen);
   return chosen;
 }
 
 double coverage(const StereoFeatures& features, const std::vector<int>& indices) {
   constexpr int kColumns = 8, kRows = 4;
   std::bitset<kColumns * kRows> cells;
-  // Clamped before it becomes an integer, which a position far outside of the image overflows.
-  const auto cell = [](double position, int size, int count) {
-    return static_cast<std::size_t>(std::clamp(position * count / size, 0.0, count - 1.0));
-  };
+  const StereoCamera& camera = features.camera;
   for (const int i : indices)
-    cells.set(cell(features.v[i], features.camera.height, kRows) * kColumns +
-              cell(features.u[i], features.camera.width, kColumns));
+    cells.set(
+        static_cast<std::size_t>(gridCell(features.u[i], features.v[i], camera.width, camera.height, kColumns, kRows)));
   return static_cast<double>(cells.count()) / (kColumns * kRows);
 }
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "../map/local_map.hpp"
@@ -50,14 +49,14 @@ struct MotionScene {
   const LocalMap& map;
   RigCalibration calibration;
   const StereoFeatures& features;
-  std::optional<Eigen::Isometry3d> T_current_reference;  ///< predicted; reference: the map's newest pair
-  std::optional<Eigen::Isometry3d> guess;                ///< the same from another source than images
-  std::vector<ExpectedMotion> prior;  ///< mixture for T_reference_current; empty: all motions are equally likely
-  bool all_compete = false;           ///< an earlier doubt lasts: all hypotheses compete
-  bool searches_wide = false;         ///< the doubt makes pairs doubtful: search at once in the wide radius
-  double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
+  bool all_compete = false;    ///< an earlier doubt lasts: all hypotheses compete
+  bool searches_wide = false;  ///< the doubt makes pairs doubtful: search at once in the wide radius
+  double tolerance = 0.05;     ///< m: motions that differ by less than this and 3 % are equally good
   Noise noise{NoiseOptions()};
-  std::optional<PlaceBelief> place{};  ///< where the map was recognised after an outage
+  std::optional<Eigen::Isometry3d> T_current_reference{};  ///< predicted; reference: the map's newest pair
+  std::optional<Eigen::Isometry3d> guess{};                ///< the same from another source than images
+  std::vector<ExpectedMotion> prior{};  ///< mixture for T_reference_current; empty: all motions are equally likely
+  std::optional<PlaceBelief> place{};   ///< where the map was recognised after an outage
 };
 
 /// A motion that competes for being the camera's, its matches and its rivals.
@@ -68,7 +67,7 @@ struct MotionHypothesis {
   std::vector<Correspondence> correspondences;
   std::vector<LocalMap::Sighting> sightings;   ///< of the motion's inliers
   double gate = 0.0;                           ///< px: search radius around predicted positions
-  double match_time = 0.0, motion_time = 0.0;  ///< s
+  double match_time = 0.0, motion_time = 0.0;  ///< of the whole search, s
 
   Agreement agreement;       ///< matches that rivals explain are left out
   double innovation = 0.0;   ///< squared Mahalanobis distance from the prior; 0 without one
@@ -153,8 +152,8 @@ double logAgreement(const Agreement& agreement);
 /// Log-odds that a motion is wrong, by this pair's innovation and agreement of lasting points.
 double logOddsWrong(const MotionHypothesis& hypothesis);
 
-/// Weighs hypotheses by prior and likelihood, and merges those of one motion. Returns the likeliest with its rivals and
-/// the times of all. `threshold`, px: of an inlier.
+/// Weighs hypotheses by prior and likelihood, and merges those of one motion. Returns the likeliest with its rivals.
+/// `threshold`, px: of an inlier.
 MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses);
 
 /// Ratio of the cells in an 8x4 grid over the image that have one of these features.

@@ -48,17 +48,17 @@ double MotionPrior::interval(double dt, const Eigen::Isometry3d& motion) const {
 ExpectedMotion MotionPrior::predicted(double dt) const {
   // Stamps of a burst are closer together than the moments at which its pairs were taken.
   const double time = std::max(dt, longest_interval_);
-  const Vector6d missed = *velocity_ * (time - dt);
-  return {expSE3(*velocity_ * dt), processNoise(time, velocity_interval_, 0.0) + missed * missed.transpose() +
-                                       time * time * velocity_covariance_ + doubt_};
+  const Vector6d missed = last_->value * (time - dt);
+  return {expSE3(last_->value * dt), processNoise(time, last_->interval, 0.0) + missed * missed.transpose() +
+                                         time * time * last_->covariance + doubt_};
 }
 
 std::optional<ExpectedMotion> MotionPrior::priorByConfirmed(std::int64_t stamp, double dt) const {
   if (!confirmed_) return std::nullopt;
-  const double age = static_cast<double>(stamp - confirmed_stamp_) * 1e-9;
-  const ExpectedMotion expected{expSE3(*confirmed_ * dt), processNoise(longest(dt), longest(confirmed_interval_), age) +
-                                                              stampNoise(*confirmed_) +
-                                                              dt * dt * confirmed_covariance_};
+  const double age = static_cast<double>(stamp - confirmed_->stamp) * 1e-9;
+  const ExpectedMotion expected{expSE3(confirmed_->value * dt),
+                                processNoise(longest(dt), longest(confirmed_->interval), age) +
+                                    stampNoise(confirmed_->value) + dt * dt * confirmed_->covariance};
   const double error = std::sqrt(expected.covariance.topLeftCorner<3, 3>().trace());
   return error < options_.max_speed * options_.max_gap ? std::optional(expected) : std::nullopt;
 }
@@ -69,23 +69,23 @@ ExpectedMotion MotionPrior::around(const Eigen::Isometry3d& motion, double dt) c
 }
 
 double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const {
-  if (!velocity_ || !previous_velocity_) return 0.0;
+  if (!last_ || !before_last_) return 0.0;
   // In the right order the velocities are before, velocity, now. In the wrong one: before, `swapped_first` (the last
   // motion and this one, which leads back), -now.
   const Vector6d second = logSE3(motion), now = second / dt;
-  const Vector6d swapped_first = *velocity_ + second / velocity_interval_;
-  const Matrix6d measured = 2.0 * dt * dt * velocity_covariance_;  // of two motions
+  const Vector6d swapped_first = last_->value + second / last_->interval;
+  const Matrix6d measured = 2.0 * dt * dt * last_->covariance;  // of two motions
   // Of a change of the velocity, bounded by the probability that the prior is wrong.
   const auto cost = [&](const Vector6d& from, const Vector6d& to) {
     const double square = around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), measured);
     return std::min(0.5 * square, -std::log(kTailProbability));
   };
-  const Vector6d& before = *previous_velocity_;
-  return cost(before, *velocity_) + cost(*velocity_, now) - cost(before, swapped_first) - cost(swapped_first, -now);
+  const Vector6d &before = before_last_->value, &last = last_->value;
+  return cost(before, last) + cost(last, now) - cost(before, swapped_first) - cost(swapped_first, -now);
 }
 
 Matrix6d MotionPrior::outageCovariance(double seconds) const {
-  const Vector6d velocity = confirmed_.value_or(Vector6d::Zero());
+  const Vector6d velocity = confirmed_ ? confirmed_->value : Vector6d(Vector6d::Zero());
   const auto spread = [&](double speed, double acceleration, double most) {
     const double t = seconds;
     return std::min(speed * speed * t * t + acceleration * acceleration * t * t * t / 3.0, most * most);
@@ -95,7 +95,7 @@ Matrix6d MotionPrior::outageCovariance(double seconds) const {
 }
 
 Matrix6d MotionPrior::lastStepCovariance(double seconds, double dt) const {
-  const Vector6d velocity = confirmed_.value_or(Vector6d::Zero());
+  const Vector6d velocity = confirmed_ ? confirmed_->value : Vector6d(Vector6d::Zero());
   const auto spread = [&](double speed, double acceleration, double most) {
     return std::min(speed * speed + acceleration * acceleration * seconds, most * most) * dt * dt;
   };
@@ -129,14 +129,8 @@ void MotionPrior::takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& moti
   // The error of stamps may make a motion too fast, but such a velocity predicts no other motion.
   if (!(velocity.head<3>().norm() <= options_.max_speed) || !(velocity.tail<3>().norm() <= options_.max_rotation_rate))
     return;
-  previous_velocity_ = std::exchange(velocity_, velocity);
-  velocity_interval_ = dt;
-  velocity_covariance_ = covariance / (dt * dt);
-  if (!is_confirmed && confirmed_) return;
-  confirmed_ = velocity;
-  confirmed_interval_ = dt;
-  confirmed_covariance_ = velocity_covariance_;
-  confirmed_stamp_ = stamp;
+  before_last_ = std::exchange(last_, Velocity{velocity, covariance / (dt * dt), dt, stamp});
+  if (is_confirmed || !confirmed_) confirmed_ = last_;
 }
 
 }  // namespace sdvo

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "../motion/noise.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
@@ -37,7 +36,7 @@ class MotionPrior {
   void noteInterval(double dt);
 
   /// Last measured velocity in the camera's frame, m/s and rad/s; none where no motion can be predicted.
-  const std::optional<Vector6d>& velocity() const { return velocity_; }
+  std::optional<Vector6d> velocity() const { return last_ ? std::optional(last_->value) : std::nullopt; }
 
   /// Duration of a motion, s, between pairs whose stamps are `dt` s apart. It is longer than `dt` for a burst, whose
   /// stamps lie closer together than its exposures, and where the motion would exceed max_speed or
@@ -79,9 +78,16 @@ class MotionPrior {
                     bool is_confirmed, const Matrix6d& doubt);
 
   /// The next pair does not continue the last one: no motion is predicted. The confirmed velocity stays.
-  void interrupt() { velocity_.reset(), previous_velocity_.reset(), doubt_.setZero(); }
+  void interrupt() { last_.reset(), before_last_.reset(), doubt_.setZero(); }
 
  private:
+  struct Velocity {
+    Vector6d value;       ///< m/s and rad/s
+    Matrix6d covariance;  ///< of its measurement
+    double interval;      ///< s, over which it was measured
+    std::int64_t stamp;   ///< ns, at the interval's end
+  };
+
   /// Covariance, m^2 and rad^2, of a motion over `dt` s under white acceleration. Its prediction is a mean velocity
   /// over `before` s, an interval that ended `age` s earlier.
   Matrix6d processNoise(double dt, double before, double age) const;
@@ -90,14 +96,11 @@ class MotionPrior {
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
   MotionPriorOptions options_;
-  std::optional<Vector6d> velocity_, previous_velocity_, confirmed_;  ///< m/s and rad/s
-  Matrix6d velocity_covariance_ = Matrix6d::Zero(), confirmed_covariance_ = Matrix6d::Zero();
-  Matrix6d doubt_ = Matrix6d::Zero();                          ///< see takeVelocity(): m and rad
-  std::int64_t confirmed_stamp_ = 0;                           ///< ns
-  double velocity_interval_ = 0.0, confirmed_interval_ = 0.0;  ///< s, over which the velocities were measured
-  double longest_interval_ = 0.0;                              ///< s, decaying maximum of the intervals
-  double mean_interval_ = 0.0;                                 ///< s, running mean
-  double counted_intervals_ = 0.0;                             ///< number of intervals in the mean, bounded
+  std::optional<Velocity> last_, before_last_, confirmed_;
+  Matrix6d doubt_ = Matrix6d::Zero();  ///< see takeVelocity(): m and rad
+  double longest_interval_ = 0.0;      ///< s, decaying maximum of the intervals
+  double mean_interval_ = 0.0;         ///< s, running mean
+  double counted_intervals_ = 0.0;     ///< number of intervals in the mean, bounded
 };
 
 /// Second moment of a difference between motions. Each direction of translation, and of rotation, gets the whole

@@ -11,11 +11,6 @@
 
 namespace sdvo {
 
-void MountCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now) {
-  T_base_camera_ = T_base_camera;
-  tilt_.add(T_base_camera, T_before_now);
-}
-
 Finding MountCheck::judge(double tilt_sigma) const {
   constexpr double kEnough = 1.0;    // m of way (chosen)
   constexpr double kProved = 5.0;    // standard deviations of the estimated tilt (chosen)
@@ -46,7 +41,7 @@ Finding MountCheck::judge(double tilt_sigma) const {
   const Eigen::Quaterniond upright = Eigen::Quaterniond::FromTwoVectors(normal, Eigen::Vector3d::UnitZ());
   Eigen::Matrix3d R_link_optical;  // a link looks along x
   R_link_optical << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
-  const Eigen::Matrix3d R = upright * T_base_camera_.linear() * R_link_optical.transpose();
+  const Eigen::Matrix3d R = upright * tilt_.mount().linear() * R_link_optical.transpose();
   return {
       Verdict::kWarn, what,
       text(4, "the camera's mount on TF is wrong, or the floor is none: rpy of a camera link that looks along x is ",

@@ -9,13 +9,14 @@ namespace sdvo {
 class MountCheck {
  public:
   /// `T_before_now`: of the camera since the pair before. Another mount begins anew.
-  void add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now);
+  void add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now) {
+    tilt_.add(T_base_camera, T_before_now);
+  }
 
   /// `tilt_sigma`: deg, as the mount is trusted beforehand.
   Finding judge(double tilt_sigma) const;
 
  private:
-  Eigen::Isometry3d T_base_camera_ = Eigen::Isometry3d::Identity();
   MountTilt tilt_{PlanarOptions()};
 };
 

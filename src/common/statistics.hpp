@@ -23,6 +23,12 @@ inline double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
+/// Square of the quantile of Student's distribution, by degree of freedom, where that of the normal distribution is
+/// `square`: an upper bound, or an approximation with the `correction` (8 f + 3) / (8 f + 1) (Wallace 1959).
+inline double studentSquare(double square, double freedom, double correction = 1.0) {
+  return std::expm1(square / freedom * correction * correction);
+}
+
 /// Probability of at least `successes` in independent trials; `probability` of each in (0, 1).
 inline double binomialTail(int trials, int successes, double probability) {
   double tail = 0.0;

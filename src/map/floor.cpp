@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "../common/text.hpp"
+#include "../motion/motion_refinement.hpp"
 
 namespace sdvo {
 namespace {
@@ -43,7 +44,7 @@ double Floor::cost(double square) {
 }
 
 double Floor::weight(double square) {
-  return 1.0 / (1.0 + square / kKernelSquare);
+  return cauchyWeight(square / kKernelSquare);
 }
 
 Eigen::Matrix<double, 6, 3> Floor::gain(const Jacobian& jacobian, const Matrix6d& covariance) const {

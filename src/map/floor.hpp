@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <cmath>
 #include <string>
 
 #include "../motion/noise.hpp"

@@ -112,9 +112,8 @@ DescribedPoints LocalMap::points(int sightings) const {
   return found;
 }
 
-void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
-                      const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
-                      const RigCalibration& calibration) {
+void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
+                      const std::vector<Sighting>& sightings, const RigCalibration& calibration) {
   camera_ = features.camera;
   kind_ = features.kind();
 
@@ -130,20 +129,19 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
   frames_.back().is_keyframe = needsKeyframe();
   // With patches the point is by definition where this corner was detected, so the first sighting hardly errs. Without
   // patches it errs as much as later ones.
-  const double sigma =
-      alignment.canAlign(features.patch_layout.side) ? NoiseOptions::kReference : options_.noise.corner;
+  const double sigma = canAlign(features.patch_layout.side) ? NoiseOptions::kReference : options_.noise.corner;
   for (int i = 0; i < features.count(); ++i)
     if (!recognised[i]) startPoint(features, i, id, T_camera_origin, calibration, sigma);
   if (static_cast<int>(frames_.size()) > options_.keyframes + 1) forgetKeyframe();
 }
 
-LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
-                                   const Eigen::Isometry3d& T_camera_origin, int point, int feature) const {
+LocalMap::Sighting LocalMap::sight(const StereoFeatures& features, const Eigen::Isometry3d& T_camera_origin, int point,
+                                   int feature) const {
   const NoiseOptions& noise = options_.noise;
-  const double sigma = options.canAlign(features.patch_layout.side) ? noise.unconfirmedCorner() : noise.corner;
+  const double sigma = canAlign(features.patch_layout.side) ? noise.unconfirmedCorner() : noise.corner;
   Sighting sighting{{{features.u[feature], features.v[feature], features.disparity[feature]}, sigma}, point, feature};
   const Point& seen = points_[point];
-  const auto found = seen.reference.findIn(options, features, feature, T_camera_origin, seen.position);
+  const auto found = seen.reference.findIn(noise, features, feature, T_camera_origin, seen.position);
   if (!found) return sighting;
   sighting.measurement.head<2>() += found->shift;
   sighting.sigma = found->sigma;
@@ -278,18 +276,18 @@ const OldKeyframe* LocalMap::revisited() const {
   return nearest && std::none_of(frames_.begin(), frames_.end(), is_here) ? nearest : nullptr;
 }
 
-void LocalMap::recall(const OldKeyframe& old, const std::vector<Link>& links) {
+void LocalMap::recall(const OldKeyframe& old, const std::vector<Sighting>& links) {
   const auto later =
       std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id > old.id; });
   frames_.insert(later, {old.id, old.T_camera_origin, true, true});
   std::unordered_map<int, Point*> of_feature;
   for (Point& point : points_)
     if (point.observations.back().frame_id == newestId()) of_feature[point.observations.back().feature] = &point;
-  for (const Link& link : links) {
+  for (const Sighting& link : links) {
     auto& observations = of_feature.at(link.feature)->observations;
-    const OldKeyframe::Point& point = old.points[static_cast<std::size_t>(link.point)];
+    const OldKeyframe::Point& point = old.points[link.point];
     // The old key frame's reference and the map point's may be of spots a little apart: the measurement is shifted.
-    const Eigen::Vector2d apart = link.position - observations.back().measurement.head<2>();
+    const Eigen::Vector2d apart = (link.measurement - observations.back().measurement).head<2>();
     Eigen::Vector3d measurement = point.observation.measurement;
     measurement.head<2>() -= apart / link.scale;
     const auto place = std::find_if(observations.begin(), observations.end(),

@@ -1,14 +1,12 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <opencv2/core.hpp>
 #include <utility>
 #include <vector>
 
-#include "../matching/patch_alignment.hpp"
 #include "../motion/noise.hpp"
 #include "keyframe_memory.hpp"
 #include "map_point.hpp"
@@ -76,15 +74,14 @@ class LocalMap {
   /// The sighting of a point by the feature that was matched with it; the pair was seen from about `T_camera_origin`.
   /// The feature's patch is aligned with the point's reference, which is warped by the poses and the point's depth.
   /// Without patches, or where they do not agree, the position is the detected corner.
-  Sighting sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
-                 const Eigen::Isometry3d& T_camera_origin, int point, int feature) const;
+  Sighting sight(const StereoFeatures& features, const Eigen::Isometry3d& T_camera_origin, int point,
+                 int feature) const;
 
   /// Adds a pair seen from `T_camera_origin` and its sightings. Every other feature becomes a new point; its sigma
-  /// depends on whether `alignment` can align later sightings with it. The previous pair is forgotten unless it is a
-  /// key frame.
-  void insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
-              const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
-              const RigCalibration& calibration);
+  /// depends on whether later sightings can be aligned with it. The previous pair is forgotten unless it is a key
+  /// frame.
+  void insert(const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
+              const std::vector<Sighting>& sightings, const RigCalibration& calibration);
 
   /// Moves the newest pair's observations from its features as they were inserted to the same features elsewhere, once
   /// a better velocity has moved the rows of a rolling shutter.
@@ -94,16 +91,9 @@ class LocalMap {
   /// it, or while another one is recalled.
   const OldKeyframe* revisited() const;
 
-  /// A point of an old key frame in the newest pair.
-  struct Link {
-    int point;                 ///< of the old key frame
-    int feature;               ///< of the newest pair
-    Eigen::Vector2d position;  ///< (u_left, v_left) of the old key frame's point in the newest pair, px
-    double sigma;              ///< of each of them, px
-    double scale;              ///< how much larger the point appears now
-  };
-  /// Inserts an old key frame into the map again. The links become its observations of the newest pair's points.
-  void recall(const OldKeyframe& old, const std::vector<Link>& links);
+  /// Inserts an old key frame into the map again. `links`: sightings of its points in the newest pair, which become its
+  /// observations of the newest pair's points.
+  void recall(const OldKeyframe& old, const std::vector<Sighting>& links);
 
   /// Moves the whole map rigidly, so that its newest pair has the pose T_newest_origin.
   void moveTo(const Eigen::Isometry3d& T_newest_origin);

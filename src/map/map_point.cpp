@@ -23,11 +23,10 @@ void ReferencePatch::take(const StereoFeatures& features, int feature, const Eig
   centre = (position - Eigen::Vector2d(features.u[feature], features.v[feature])).cast<float>() / spacing;
 }
 
-std::optional<ReferencePatch::Found> ReferencePatch::findIn(const PatchAlignmentOptions& options,
-                                                            const StereoFeatures& features, int feature,
-                                                            const Eigen::Isometry3d& T_now_origin,
+std::optional<ReferencePatch::Found> ReferencePatch::findIn(const NoiseOptions& noise, const StereoFeatures& features,
+                                                            int feature, const Eigen::Isometry3d& T_now_origin,
                                                             const AnchoredPoint& point) const {
-  if (!options.canAlign(features.patch_layout.side) ||
+  if (!canAlign(features.patch_layout.side) ||
       samples.size() != static_cast<std::size_t>(features.patch_layout.bytes()))
     return std::nullopt;
 
@@ -44,7 +43,7 @@ std::optional<ReferencePatch::Found> ReferencePatch::findIn(const PatchAlignment
   const int side = features.patch_layout.side;
   const Patch old_patch{samples.data(), side, spacing};
   const Patch new_patch{features.patches.ptr(feature), side, features.patch_layout.spacing(features.size[feature])};
-  const auto found = alignPatch(options, old_patch, centre, new_patch, warp.cast<float>());
+  const auto found = alignPatch(noise, old_patch, centre, new_patch, warp.cast<float>());
   if (!found) return std::nullopt;
   return Found{found->shift.cast<double>(), found->sigma, scale};
 }

@@ -61,7 +61,7 @@ struct ReferencePatch {
   };
   /// Aligns the feature's patch with this one, which is warped by the poses and the point's depth. The pair is seen
   /// from about `T_camera_origin`. Nothing without patches or where they do not agree.
-  std::optional<Found> findIn(const PatchAlignmentOptions& options, const StereoFeatures& features, int feature,
+  std::optional<Found> findIn(const NoiseOptions& noise, const StereoFeatures& features, int feature,
                               const Eigen::Isometry3d& T_camera_origin, const AnchoredPoint& point) const;
 };
 

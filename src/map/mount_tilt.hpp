@@ -31,6 +31,7 @@ class MountTilt {
   Matrix6d ofPose(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_origin_camera,
                   bool is_on_floor) const;
 
+  const Eigen::Isometry3d& mount() const { return T_base_camera_; }
   double distance() const { return distance_; }  ///< m
 
  private:

@@ -13,18 +13,6 @@
 namespace sdvo {
 namespace {
 
-FeatureMatcherOptions ungated(FeatureMatcherOptions options) {
-  options.gating = false;  // the camera's pose is unknown
-  return options;
-}
-
-/// After consensus, points are predicted to within the threshold, so matches are sought within twice of that.
-FeatureMatcherOptions gatedBy(FeatureMatcherOptions options, double threshold) {
-  options.gating = true;
-  options.gate_radius = std::max(2.0 * threshold, 1.0);
-  return options;
-}
-
 /// Splits points into `parts` of equal size, at the median along the longer axis each time. Returns the number of parts
 /// with a point found.
 int partsWithPoints(ExpectedPoint* first, ExpectedPoint* last, int parts) {
@@ -110,8 +98,9 @@ double chanceOfAnotherPlace(std::vector<ExpectedPoint> points) {
   return binomialTail(parts, partsWithPoints(points.data(), points.data() + points.size(), parts), kRepeated);
 }
 
-Reacquisition::Reacquisition(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion)
-    : anywhere_(ungated(matcher), motion), near_(gatedBy(matcher, motion.inlier_threshold), motion) {}
+/// After consensus, points are predicted to within the threshold, so matches are sought within twice of that.
+Reacquisition::Reacquisition(const MotionEstimatorOptions& motion)
+    : anywhere_(motion), near_(motion, {std::max(2.0 * motion.inlier_threshold, 1.0)}) {}
 
 std::optional<Reacquisition::Match> Reacquisition::match(const DescribedPoints& seen_again,
                                                          const DescribedPoints& points, const StereoFeatures& features,
@@ -141,9 +130,8 @@ std::optional<FoundPlace> Reacquisition::find(const LocalMap& map, const StereoF
   return place;
 }
 
-Revisit::Revisit(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
-                 const PatchAlignmentOptions& alignment)
-    : motion_options_(motion), alignment_options_(alignment), views_(matcher.widened(), motion) {}
+Revisit::Revisit(const MotionEstimatorOptions& motion)
+    : motion_options_(motion), views_(motion, FeatureMatcherOptions::wide()) {}
 
 bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calibration, LocalMap& map) const {
   const OldKeyframe* old = map.revisited();
@@ -152,18 +140,19 @@ bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calib
   auto [matches, correspondences, motion] = views_.match(old->described, features, calibration, expected);
   if (!motion.success) return false;
 
-  std::vector<LocalMap::Link> links;
+  std::vector<LocalMap::Sighting> links;
   std::vector<Correspondence> aligned;
   for (const int i : motion.inliers) {
     const FeatureMatch& match = matches[i];
     const OldKeyframe::Point& point = old->points[match.reference];
-    const auto found = point.reference.findIn(alignment_options_, features, match.current,
+    const auto found = point.reference.findIn(map.options().noise, features, match.current,
                                               motion.T_current_reference * old->T_camera_origin, point.position);
     if (!found) continue;
     const Eigen::Vector3d& then = old->described.positions[match.reference];
     const Eigen::Vector3d measurement = measurementOf(features, match.current, calibration, found->shift);
     const double scale = then.z() / (motion.T_current_reference * then).z();
-    links.push_back({match.reference, match.current, measurement.head<2>(), found->sigma, scale});
+    const Eigen::Vector3d seen(measurement.x(), measurement.y(), features.disparity[match.current]);
+    links.push_back({{seen, found->sigma}, match.reference, match.current, true, scale});
     aligned.push_back({then, measurement});
   }
   if (static_cast<int>(links.size()) < map.options().lasting_points) return false;

@@ -5,7 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include "../matching/patch_alignment.hpp"
 #include "../matching/view_matcher.hpp"
 #include "../motion/rig_calibration.hpp"
 #include "local_map.hpp"
@@ -36,7 +35,7 @@ struct FoundPlace {
 /// Recognises the map from before an outage in a pair, without any guess of the motion meanwhile.
 class Reacquisition {
  public:
-  Reacquisition(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion);
+  explicit Reacquisition(const MotionEstimatorOptions& motion);
 
   /// Nothing if the pair does not show the map's place.
   std::optional<FoundPlace> find(const LocalMap& map, const StereoFeatures& features,
@@ -56,8 +55,7 @@ class Reacquisition {
 /// Links the map's newest pair to a remembered key frame of the same place, which removes the drift since then.
 class Revisit {
  public:
-  Revisit(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
-          const PatchAlignmentOptions& alignment);
+  explicit Revisit(const MotionEstimatorOptions& motion);
 
   /// Recalls the key frame to whose place the newest pair has come back, if enough aligned points confirm it. Returns
   /// whether it did; if not, the map is unchanged.
@@ -65,7 +63,6 @@ class Revisit {
 
  private:
   MotionEstimatorOptions motion_options_;
-  PatchAlignmentOptions alignment_options_;
   ViewMatcher views_;
 };
 

@@ -1,5 +1,6 @@
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <numeric>
@@ -167,8 +168,6 @@ class PositionGrid {
 
 }  // namespace
 
-FeatureMatcher::FeatureMatcher(const FeatureMatcherOptions& options) : options_(checked(options)) {}
-
 std::vector<FeatureMatch> FeatureMatcher::match(const DescribedPoints& reference, const StereoFeatures& current,
                                                 const std::optional<Eigen::Isometry3d>& T_current_reference) const {
   if (reference.count() == 0 || current.count() == 0) return {};
@@ -178,7 +177,7 @@ std::vector<FeatureMatch> FeatureMatcher::match(const DescribedPoints& reference
                                 toString(kind));
 
   std::optional<PositionGrid> grid;
-  if (options_.gating && T_current_reference) grid.emplace(current, options_.gate_radius);
+  if (T_current_reference) grid.emplace(current, options_.gate_radius);
 
   std::vector<Nearest> of_reference(reference.count()), of_current(current.count());
   std::vector<int> all(static_cast<std::size_t>(current.count()));

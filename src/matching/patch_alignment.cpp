@@ -2,10 +2,10 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "../common/kernel.hpp"
+#include "../common/text.hpp"
 #include "patch_samples.hpp"
 
 namespace sdvo {
@@ -75,15 +75,6 @@ float sumOfSquaredDifferences(int count, float contrast, const float* grey, cons
   return sum;
 }
 
-const SampleSquare& squareOf(int radius) {
-  static const std::array<SampleSquare, PatchAlignmentOptions::kLargestRadius + 1> squares = [] {
-    std::array<SampleSquare, PatchAlignmentOptions::kLargestRadius + 1> all;
-    for (int r = 0; r <= PatchAlignmentOptions::kLargestRadius; ++r) all[static_cast<std::size_t>(r)] = SampleSquare(r);
-    return all;
-  }();
-  return squares[static_cast<std::size_t>(radius)];
-}
-
 /// The reference's pixels and their derivatives, without their means.
 struct Template {
   Samples grey, by_x, by_y;
@@ -109,28 +100,27 @@ bool makeTemplate(const NearPatch& reference, const Eigen::Vector2f& centre, con
 
 }  // namespace
 
-std::string PatchAlignmentOptions::complaint(int patch_side) const {
+std::string alignmentComplaint(int patch_side) {
   if (patch_side == 0 || canAlign(patch_side)) return "";
-  const std::string side = std::to_string(patch_side);
-  return "patches of " + side + "x" + side +
-         " samples are too small for the alignment: no match is aligned; descriptor/patch_side of stereo_features must "
-         "be " +
-         std::to_string(leastSide()) + " or more";
+  return text(0, "patches of ", patch_side, "x", patch_side,
+              " samples are too small for the alignment: no match is aligned; descriptor/patch_side of stereo_features "
+              "must be ",
+              kLeastPatchSide, " or more");
 }
 
-std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,
-                                     const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp) {
+std::optional<PatchShift> alignPatch(const NoiseOptions& noise, const Patch& reference, const Eigen::Vector2f& centre,
+                                     const Patch& current, const Eigen::Matrix2f& warp) {
   constexpr int kIterations = 10;
   constexpr float kConverged = 0.02f;        // samples
   constexpr float kLeastCorrelation = 0.7f;  // of the aligned patches
-  const SampleSquare& square = squareOf(options.radius);
+  static const SampleSquare square;
   thread_local NearPatch near_reference, near_current;
   near_reference.take(reference), near_current.take(current);
   Template pattern;
   if (!makeTemplate(near_reference, centre, square, pattern)) return std::nullopt;
   const Eigen::Matrix2f inverse = pattern.hessian.inverse();
   const Eigen::Matrix2f grid = warp * (reference.spacing / current.spacing);
-  const float largest = static_cast<float>(options.noise.cornerGate()) / current.spacing;
+  const float largest = static_cast<float>(noise.cornerGate()) / current.spacing;
 
   Eigen::Vector2f position = Eigen::Vector2f::Zero();
   Samples grey;
@@ -162,9 +152,9 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   // amount. Noise of the current patch does so, too, but not by less than unwarped: where the point appears smaller,
   // neighbouring values share samples.
   const float left = sumOfSquaredDifferences(square.count(), contrast, grey.data(), pattern.grey.data());
-  const float noise = left / static_cast<float>(square.pixels() - 4);
+  const float variance = left / static_cast<float>(square.pixels() - 4);
   const float warped = (grid * inverse * grid.transpose()).trace(), own = std::max(warped, inverse.trace());
-  found.sigma = current.spacing * std::hypot(std::sqrt(0.5f * noise * (warped + own)), kConverged);
+  found.sigma = current.spacing * std::hypot(std::sqrt(0.5f * variance * (warped + own)), kConverged);
   return found;
 }
 

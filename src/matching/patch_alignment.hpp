@@ -5,30 +5,19 @@
 #include <optional>
 #include <string>
 
-#include "../motion/noise.hpp"
-#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
 
-struct PatchAlignmentOptions {
-  int radius = 4;
-  NoiseOptions noise;  ///< of corners, which bounds their corrections, and of what alignment leaves
+constexpr int kAlignedRadius = 4;                        ///< samples: half side of the part that is aligned
+constexpr int kLeastPatchSide = 2 * kAlignedRadius + 3;  ///< derivatives need one sample more on each side
 
-  void describe(OptionList& list) {
-    list.add("radius", radius, {2, kLargestRadius}, "samples",
-             "half side of the part of the reference that is aligned");
-  }
-
-  /// Whether patches of so many samples a side can be aligned: derivatives need one sample more on each side.
-  bool canAlign(int patch_side) const { return patch_side >= leastSide(); }
-  /// A warning if patches are too small to be aligned; empty if they are large enough, or if there are none.
-  std::string complaint(int patch_side) const;
-
-  static constexpr int kLargestRadius = 6;
-
- private:
-  int leastSide() const { return 2 * (radius + 1) + 1; }
-};
+/// Whether patches of so many samples a side can be aligned.
+constexpr bool canAlign(int patch_side) {
+  return patch_side >= kLeastPatchSide;
+}
+/// A warning if patches are too small to be aligned; empty if they are large enough, or if there are none.
+std::string alignmentComplaint(int patch_side);
 
 /// A grey patch as it travels with a feature: side x side samples, row by row.
 struct Patch {
@@ -48,8 +37,9 @@ struct PatchShift {
 /// reference). The search begins in the current patch's middle. It is an inverse compositional alignment (Baker and
 /// Matthews 2004), blind to brightness and contrast. `warp` takes offsets in the reference image to offsets in the
 /// current one, px; mostly a scale by the ratio of the depths. Nothing where the patches differ (an occluding edge,
-/// another point), have too little texture, or where the result lies outside.
-std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,
-                                     const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp);
+/// another point), have too little texture, or where the result lies outside. `noise`: of the corner in the current
+/// patch's middle, which bounds the shift.
+std::optional<PatchShift> alignPatch(const NoiseOptions& noise, const Patch& reference, const Eigen::Vector2f& centre,
+                                     const Patch& current, const Eigen::Matrix2f& warp);
 
 }  // namespace sdvo

@@ -8,18 +8,19 @@ namespace sdvo {
 namespace {
 
 constexpr int kRow = 16;  // numbers of a row in registers: whole ones
-static_assert(kLargestSampledSide < kRow, "a pixel more than the samples is read");
-static_assert((kLargestSampledSide - 2) * (kLargestSampledSide - 2) + kRow <= kMostSampled, "a row is written at once");
+static_assert(kLeastPatchSide < kRow, "a pixel more than the samples is read");
+static_assert(kSampledSide * kSampledSide + kRow <= kSamples, "a row is written at once");
 
 /// The square's values and derivatives; its middle lies at (x, y) of the patch.
 struct SampleUpright {
-  static SDVO_IN_KERNEL void run(const std::uint8_t* patch, int side, float x, float y, int radius, float* values,
-                                 float* by_x, float* by_y) {
-    const int last = side - 2, reach = radius + 1;
+  static SDVO_IN_KERNEL void run(const std::uint8_t* patch, int side, float x, float y, float* values, float* by_x,
+                                 float* by_y) {
+    constexpr int reach = kAlignedRadius + 1;
+    const int last = side - 2;
     const int column = std::clamp(static_cast<int>(x - static_cast<float>(reach)), 0, last);
     float a[kRow];
     for (int i = 0; i < kRow; ++i) a[i] = (x + static_cast<float>(i - reach)) - static_cast<float>(column + i);
-    float around[kLargestSampledSide * kRow + kRow];
+    float around[kLeastPatchSide * kRow + kRow];
     for (int j = 0; j <= 2 * reach; ++j) {
       const float v = y + static_cast<float>(j - reach);
       const int row = std::clamp(static_cast<int>(v), 0, last);
@@ -34,7 +35,7 @@ struct SampleUpright {
     std::fill_n(around + (2 * reach + 1) * kRow, kRow, 0.f);
 
     // What is written beyond a row is overwritten by the next one.
-    const int columns = 2 * radius + 1;
+    constexpr int columns = kSampledSide;
     for (int j = 0; j < columns; ++j)
       for (int i = 0; i < kRow; i += 8) {
         const float* here = around + (j + 1) * kRow + 1 + i;
@@ -79,11 +80,11 @@ struct SampleGrid {
 
 }  // namespace
 
-SampleSquare::SampleSquare(int radius) : radius_(radius) {
+SampleSquare::SampleSquare() {
   for (int j = 0; j < side(); ++j)
     for (int i = 0; i < side(); ++i) {
       const std::size_t k = static_cast<std::size_t>(j * side() + i);
-      x_[k] = static_cast<float>(i - radius), y_[k] = static_cast<float>(j - radius);
+      x_[k] = static_cast<float>(i - kAlignedRadius), y_[k] = static_cast<float>(j - kAlignedRadius);
       mask_[k] = 1.f;
     }
 }
@@ -98,7 +99,7 @@ void NearPatch::take(const Patch& patch) {
 bool SampleSquare::sample(const NearPatch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
                           Samples& values) const {
   const float half = 0.5f * static_cast<float>(patch.side() - 1);
-  const Eigen::Vector2f reach = static_cast<float>(radius_) * grid.cwiseAbs().rowwise().sum();
+  const Eigen::Vector2f reach = static_cast<float>(kAlignedRadius) * grid.cwiseAbs().rowwise().sum();
   if (!((centre.cwiseAbs() + reach).maxCoeff() <= half)) return false;
   const PatchPlacement at{half + centre.x(), half + centre.y(), grid(0, 0), grid(0, 1), grid(1, 0), grid(1, 1)};
   runKernel<SampleGrid>(patch.samples(), patch.side(), &at, x_.data(), y_.data(), mask_.data(), count(), values.data());
@@ -108,8 +109,8 @@ bool SampleSquare::sample(const NearPatch& patch, const Eigen::Vector2f& centre,
 bool SampleSquare::sampleUpright(const NearPatch& patch, const Eigen::Vector2f& centre, Samples& values, Samples& by_x,
                                  Samples& by_y) const {
   const float half = 0.5f * static_cast<float>(patch.side() - 1);
-  if (!(centre.cwiseAbs().maxCoeff() + static_cast<float>(radius_ + 1) <= half)) return false;
-  runKernel<SampleUpright>(patch.samples(), patch.side(), half + centre.x(), half + centre.y(), radius_, values.data(),
+  if (!(centre.cwiseAbs().maxCoeff() + static_cast<float>(kAlignedRadius + 1) <= half)) return false;
+  runKernel<SampleUpright>(patch.samples(), patch.side(), half + centre.x(), half + centre.y(), values.data(),
                            by_x.data(), by_y.data());
   return true;
 }

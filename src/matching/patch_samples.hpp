@@ -14,10 +14,10 @@ struct PatchPlacement {
   float x, y, x_by_x, x_by_y, y_by_x, y_by_y;
 };
 
-/// Values on a square of samples, row by row, filled up to whole registers with zeros.
-constexpr int kLargestSampledSide = 2 * (PatchAlignmentOptions::kLargestRadius + 1) + 1;
-constexpr int kMostSampled = (kLargestSampledSide * kLargestSampledSide + 7) / 8 * 8;
-using Samples = std::array<float, kMostSampled>;
+/// Values on a square of samples, row by row, then zeros: kernels write two registers behind it.
+constexpr int kSampledSide = 2 * kAlignedRadius + 1;
+constexpr int kSamples = kSampledSide * kSampledSide + 2 * 8;
+using Samples = std::array<float, kSamples>;
 
 /// A copy of a patch with room behind it, so that kernels may read whole registers.
 class NearPatch {
@@ -32,16 +32,15 @@ class NearPatch {
   int side_ = 0;
 };
 
-/// The square of side 2 radius + 1.
+/// The square of samples that are aligned.
 class SampleSquare {
  public:
-  SampleSquare() : SampleSquare(0) {}
-  explicit SampleSquare(int radius);
+  SampleSquare();
 
-  int side() const { return 2 * radius_ + 1; }
-  int pixels() const { return side() * side(); }
+  static constexpr int side() { return kSampledSide; }
+  static constexpr int pixels() { return kSampledSide * kSampledSide; }
   /// Pixels and what fills the last register.
-  int count() const { return (pixels() + 7) / 8 * 8; }
+  static constexpr int count() { return (pixels() + 7) / 8 * 8; }
   const float* mask() const { return mask_.data(); }
 
   /// Samples a patch bilinearly on this square around `centre`; `grid` maps the square's offsets to the patch's. All
@@ -55,7 +54,6 @@ class SampleSquare {
                      Samples& by_y) const;
 
  private:
-  int radius_;
   Samples x_{}, y_{}, mask_{};  ///< offset of each pixel from the square's middle; one for each pixel
 };
 

@@ -32,10 +32,10 @@ struct ViewMatch {
 /// Matches a pair with described points by descriptors, then finds the pose that most matches agree on.
 class ViewMatcher {
  public:
-  ViewMatcher(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion)
+  explicit ViewMatcher(const MotionEstimatorOptions& motion, const FeatureMatcherOptions& matcher = {})
       : matcher_(matcher), estimator_(motion) {}
 
-  /// With an expected pose the search is gated, if the options say so.
+  /// With an expected pose the search is gated.
   ViewMatch match(const DescribedPoints& reference, const StereoFeatures& features, const RigCalibration& calibration,
                   const std::optional<Eigen::Isometry3d>& expected = std::nullopt) const;
 

@@ -23,7 +23,7 @@ struct SquareResiduals {
 
 /// Sums of the Hessian's upper triangle, and of the gradient.
 struct Sums {
-  DoubleLanes hessian[6][6]{}, gradient[6]{};
+  DoubleLanes hessian[6 * 6]{}, gradient[6]{};
 };
 
 struct SumEquations {
@@ -41,31 +41,14 @@ struct SumEquations {
       const DoubleLanes left = -a * at.x * at.inverse_depth;
       const DoubleLanes right = left + p.fx_baseline * at.inverse_depth * at.inverse_depth;
       const DoubleLanes down = -b * at.y * at.inverse_depth;
-      addHorizontal(at, a, left, weight, at.u_left, sums);
-      addHorizontal(at, a, right, weight, at.u_right, sums);
-      const DoubleLanes row[5] = {b, down, down * at.y - b * at.z, -down * at.x, b * at.x};
-      const int columns[5] = {1, 2, 3, 4, 5};
-      addRow(row, columns, weight, at.v, sums);
+      const DoubleLanes of_left[] = {a, left, left * at.y, a * at.z - left * at.x, -a * at.y};
+      const DoubleLanes of_right[] = {a, right, right * at.y, a * at.z - right * at.x, -a * at.y};
+      const DoubleLanes of_v[] = {b, down, down * at.y - b * at.z, -down * at.x, b * at.x};
+      addRow<6>(of_left, {0, 2, 3, 4, 5}, weight, at.u_left, sums.hessian, sums.gradient);
+      addRow<6>(of_right, {0, 2, 3, 4, 5}, weight, at.u_right, sums.hessian, sums.gradient);
+      addRow<6>(of_v, {1, 2, 3, 4, 5}, weight, at.v, sums.hessian, sums.gradient);
     }
     *result = sums;
-  }
-
-  static SDVO_IN_KERNEL void addHorizontal(const Projected& at, const DoubleLanes& a, const DoubleLanes& c,
-                                           const DoubleLanes& weight, const DoubleLanes& residual, Sums& sums) {
-    const DoubleLanes row[5] = {a, c, c * at.y, a * at.z - c * at.x, -a * at.y};
-    const int columns[5] = {0, 2, 3, 4, 5};
-    addRow(row, columns, weight, residual, sums);
-  }
-
-  static SDVO_IN_KERNEL void addRow(const DoubleLanes (&row)[5], const int (&columns)[5], const DoubleLanes& weight,
-                                    const DoubleLanes& residual, Sums& sums) {
-#pragma GCC unroll 5
-    for (int i = 0; i < 5; ++i) {
-      const DoubleLanes weighted = weight * row[i];
-      sums.gradient[columns[i]] += weighted * residual;
-#pragma GCC unroll 5
-      for (int j = i; j < 5; ++j) sums.hessian[columns[i]][columns[j]] += weighted * row[j];
-    }
   }
 };
 
@@ -98,7 +81,7 @@ void CorrespondenceArrays::sumEquations(const StereoCamera& camera, const Eigen:
   runKernel<SumEquations>(&projection, values_.data(), std::ptrdiff_t{count}, count, weights, &sums);
   for (int i = 0; i < 6; ++i) {
     gradient[i] = total(sums.gradient[i]);
-    for (int j = i; j < 6; ++j) hessian(i, j) = hessian(j, i) = total(sums.hessian[i][j]);
+    for (int j = i; j < 6; ++j) hessian(i, j) = hessian(j, i) = total(sums.hessian[6 * i + j]);
   }
 }
 

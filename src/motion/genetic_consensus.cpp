@@ -34,7 +34,7 @@ class GeneKnowledge {
   void learn(double fitness, const Inliers& inliers) {
     if (fitness * poses_ > sum_) {
       for (const int gene : inliers()) {
-        double& quality = quality_[static_cast<std::size_t>(gene)];
+        double& quality = quality_[gene];
         quality = std::max(quality, fitness);
       }
     }

@@ -27,7 +27,6 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::
   const MotionEstimatorOptions options = options_.scaled(noise);
   MotionEstimate estimate;
   const auto failed = [&](const std::string& reason) {
-    estimate.success = false;
     estimate.reason = reason;
     return estimate;
   };
@@ -38,7 +37,6 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::
   // Reject outliers.
   const PoseProblem problem(camera, correspondences, options.inlier_threshold);
   const Consensus consensus = findConsensus(problem, options, options);
-  estimate.iterations = consensus.iterations;
   Eigen::Isometry3d& T = estimate.T_current_reference = consensus.T_current_reference;
   if (consensus.found) refineWidely(problem, options, consensus.T_current_reference, T);
   if (expected) refineWidely(problem, options, *expected, T);
@@ -53,7 +51,7 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::
 
   double square = 0.0;
   for (const int i : estimate.inliers)
-    square += reprojectionResidual(camera, T, correspondences[i]).value_or(Eigen::Vector3d::Zero()).squaredNorm();
+    square += reprojectionResidual(camera, T, correspondences[i])->squaredNorm();  // inliers are in front of the camera
   estimate.rms = std::sqrt(square / (3.0 * static_cast<double>(estimate.inliers.size())));
 
   const Eigen::LDLT<Matrix6d> factor(equations.hessian);
@@ -61,8 +59,9 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::
     return failed("the matches do not determine the motion (all of them far away or on one line?)");
   estimate.covariance = equations.variance() * factor.solve(Matrix6d::Identity());
   estimate.covariance = 0.5 * (estimate.covariance + estimate.covariance.transpose()).eval();
-  estimate.success = T.matrix().allFinite() && estimate.covariance.allFinite();
-  if (!estimate.success) return failed("the refinement did not converge to a finite motion");
+  if (!T.matrix().allFinite() || !estimate.covariance.allFinite())
+    return failed("the refinement did not converge to a finite motion");
+  estimate.success = true;
   return estimate;
 }
 

@@ -24,7 +24,6 @@ struct MotionEstimate {
   Matrix6d covariance = Matrix6d::Zero();
   std::vector<int> inliers;  ///< indices of the correspondences, ascending
   double rms = 0.0;          ///< of the inliers' residuals, px per coordinate
-  int iterations = 0;        ///< samples drawn
 };
 
 /// The indices of `first` that `second` lacks. Both ascend.

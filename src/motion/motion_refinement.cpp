@@ -18,13 +18,13 @@ class Lineariser {
   NormalEquations at(const Eigen::Isometry3d& T) {
     const double kernel_square = kernel_scale_ * kernel_scale_, inverse_square = 1.0 / kernel_square;
     NormalEquations equations;
-    LogSum costs;
+    CauchyCost costs;
     arrays_.squareResiduals(camera_, T, 0, static_cast<int>(weights_.size()), weights_.data());
     for (std::size_t i = 0; i < weights_.size(); ++i) {
       const double square = std::exchange(weights_[i], 0.0), bent = square * inverse_square;
       if (static_cast<int>(i) >= arrays_.count() || std::isinf(square)) continue;
       costs.add(bent);
-      weights_[i] = 1.0 / (1.0 + bent);
+      weights_[i] = cauchyWeight(bent);
       equations.weighted_square += weights_[i] * square;
       equations.weight += weights_[i];
     }

@@ -11,13 +11,19 @@
 
 namespace sdvo {
 
-/// Sum of log(1 + x) over many x >= 0, as the logarithm of a product: a multiplication for each is faster than a
-/// logarithm.
-class LogSum {
+// Cauchy's kernel. A residual of the square s, in units of the kernel's scale, costs log(1 + s).
+
+/// Its weight in the normal equations: the derivative of the cost by s.
+inline double cauchyWeight(double square) {
+  return 1.0 / (1.0 + square);
+}
+
+/// The cost of many residuals, as the logarithm of a product: a multiplication for each is faster than a logarithm.
+class CauchyCost {
  public:
-  void add(double x) {
+  void add(double square) {
     constexpr double kFarFromOverflow = 1e150;
-    product_ *= 1.0 + x;
+    product_ *= 1.0 + square;
     if (product_ > kFarFromOverflow) {
       sum_ += std::log(product_);
       product_ = 1.0;

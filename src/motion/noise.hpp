@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
@@ -17,6 +16,15 @@ constexpr double kUsualMemory = 0.9;
 
 /// Side, px (chosen), of a part of the image within which the errors of patches and rectification are correlated.
 constexpr double kPart = 24.0;
+
+/// Cell of a position (px) in a grid over an image, row by row; the nearest cell for a position outside.
+inline int gridCell(double u, double v, int width, int height, int columns, int rows) {
+  // Clamped before it becomes an integer, which a position far outside of the image overflows.
+  const auto index = [](double position, int size, int count) {
+    return static_cast<int>(std::clamp(position * count / size, 0.0, count - 1.0));
+  };
+  return index(v, height, rows) * columns + index(u, width, columns);
+}
 
 /// The errors of measurements of a rig, and the differences of motions that follow from them.
 class Noise {

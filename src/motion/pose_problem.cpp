@@ -24,7 +24,7 @@ Eigen::Matrix<double, 3, 6> motionJacobian(const StereoCamera& camera, const Eig
 PoseCandidates PoseProblem::solve(const MinimalSample& sample) const {
   std::array<Eigen::Vector3d, 3> points, rays;
   for (std::size_t k = 0; k < sample.size(); ++k) {
-    const Correspondence& c = correspondences_[static_cast<std::size_t>(sample[k])];
+    const Correspondence& c = correspondences_[sample[k]];
     points[k] = c.point;
     rays[k] = Eigen::Vector3d((c.measurement.x() - camera_.cx) / camera_.fx,
                               (c.measurement.y() - camera_.cy) / camera_.fy, 1.0)
@@ -41,7 +41,7 @@ void PoseProblem::visitSquares(const Eigen::Isometry3d& T, const Visit& visit) c
     const int left = std::min(count() - first, kBlock);
     arrays_.squareResiduals(camera_, T, first, CorrespondenceArrays::roundedUp(left), squares.data());
     for (int k = 0; k < left; ++k)
-      if (!visit(first + k, squares[static_cast<std::size_t>(k)])) return;
+      if (!visit(first + k, squares[k])) return;
   }
 }
 

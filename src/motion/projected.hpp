@@ -53,6 +53,20 @@ struct Projected {
   }
 };
 
+/// Adds a residual's equations to the upper triangle of the Hessian, which has kSize rows of kSize numbers, and to the
+/// gradient. The row of the Jacobian is zero but in these columns.
+template <int kSize, int kCount>
+SDVO_IN_KERNEL void addRow(const DoubleLanes (&row)[kCount], const int (&columns)[kCount], const DoubleLanes& weight,
+                           const DoubleLanes& residual, DoubleLanes* hessian, DoubleLanes* gradient) {
+#pragma GCC unroll 6
+  for (int i = 0; i < kCount; ++i) {
+    const DoubleLanes weighted = weight * row[i];
+    gradient[columns[i]] += weighted * residual;
+#pragma GCC unroll 6
+    for (int j = i; j < kCount; ++j) hessian[kSize * columns[i] + columns[j]] += weighted * row[j];
+  }
+}
+
 /// The sum of all lanes in a fixed order.
 inline double total(const DoubleLanes& lanes) {
   return (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);

@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <random>
-#include <vector>
 
 #include "motion_refinement.hpp"
 #include "noise.hpp"

@@ -1,8 +1,9 @@
 #include "odometry_state.hpp"
 
 #include <algorithm>
-#include <cstddef>
 #include <utility>
+
+#include "pair_search.hpp"
 
 namespace sdvo {
 namespace {
@@ -12,22 +13,24 @@ LearntRig unknownRig(const VisualOdometryOptions& options) {
 }
 
 /// Reports matches, inliers, and their coverage and residual.
-void reportMatches(const StereoFeatures& features, const std::vector<int>& given_indices, const MotionHypothesis& found,
-                   const std::vector<int>& rejected, OdometryResult& result) {
+void reportMatches(const SearchedPair& pair, const std::vector<int>& rejected, OdometryResult& result) {
+  const MotionHypothesis& found = pair.found;
   result.flow.reserve(found.matches.size());
   for (const FeatureMatch& match : found.matches) {
     const cv::Point3f& previous = found.view->pixels[match.reference];
-    result.flow.push_back(
-        {previous.x, previous.y, previous.z, given_indices[static_cast<std::size_t>(match.current)], false});
+    const int current = pair.given_indices[match.current];
+    result.flow.push_back({previous.x, previous.y, previous.z, current, false});
   }
   for (const int i : found.motion.inliers)
     result.flow[i].inlier = std::find(rejected.begin(), rejected.end(), found.matches[i].current) == rejected.end();
   const std::vector<int> inliers = found.inlierFeatures(rejected);
-  result.features = features.count();
+  result.features = pair.features.count();
   result.matches = static_cast<int>(found.matches.size());
   result.inliers = static_cast<int>(inliers.size());
-  result.coverage = coverage(features, inliers);
+  result.coverage = coverage(pair.features, inliers);
   result.rms = found.motion.rms;
+  result.match_time = found.match_time;
+  result.motion_time = found.motion_time;
 }
 
 void reportRig(const LearntRig& rig, OdometryResult& result) {
@@ -81,7 +84,8 @@ void OdometryState::recover(const VisualOdometryOptions& options) {
   fresh.T_origin_camera = last_sound.T_origin_camera;
   fresh.covariance.reset(last_sound.pose_covariance);
   fresh.distance = last_sound.distance;
-  fresh.camera = camera, fresh.lens = lens, fresh.last_stamp = last_stamp, fresh.last_pose_stamp = last_pose_stamp;
+  fresh.map_camera = map_camera, fresh.pair_camera = pair_camera;
+  fresh.last_stamp = last_stamp, fresh.last_pose_stamp = last_pose_stamp;
   fresh.pairs = pairs, fresh.started = started;
   fresh.last_sound = std::move(last_sound);
   *this = std::move(fresh);
@@ -105,6 +109,13 @@ void OdometryState::returnToEarlierMap() {
   epoch = earlier->epoch;
 }
 
+void OdometryState::endOutage(bool is_earlier_map) {
+  outage.end();
+  fallback_map.reset();
+  if (is_earlier_map) earlier.reset();
+  interrupted = false;
+}
+
 void OdometryState::useFallbackMap() {
   // The guesses' error up to the fallback map is in all poses that are measured against it.
   covariance.beginMap();
@@ -118,11 +129,11 @@ void OdometryState::recalibrate(const VisualOdometryOptions& options, const Ster
   forgetRig(options);
   covariance.beginMap();
   forgetMaps();
-  newest.reset();
+  newest_rolled.reset();
   map.emplace(options.map);
-  map->insert(alignmentWith(options.noise), given, pairs, T_origin_camera.inverse(), {}, rig.calibration.calibration());
-  camera = lens = given.camera;
-  lens_stamp = given.stamp;
+  map->insert(given, pairs, T_origin_camera.inverse(), {}, rig.calibration.calibration());
+  map_camera = pair_camera = given.camera;
+  camera_info_stamp = given.stamp;
 }
 
 void OdometryState::move(const Eigen::Isometry3d& T_previous_current) {
@@ -130,13 +141,12 @@ void OdometryState::move(const Eigen::Isometry3d& T_previous_current) {
   distance += T_previous_current.translation().norm();
 }
 
-OdometryResult OdometryState::report(const StereoFeatures& features, const std::vector<int>& given_indices,
-                                     const MotionHypothesis& found, const OdometryStep& step,
+OdometryResult OdometryState::report(const SearchedPair& pair, const OdometryStep& step,
                                      const std::optional<Floor>& known_floor) const {
   OdometryResult result;
   result.state = step.state;
   result.reason = step.reason;
-  result.stamp = features.stamp;
+  result.stamp = pair.features.stamp;
   result.probability = step.probability;
   result.epoch = epoch;
   result.dt = step.dt;
@@ -154,9 +164,8 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
     result.motion_covariance = step.covariance;
     result.correction = step.correction;
   }
-  reportMatches(features, given_indices, found, step.rejected_features, result);
-  result.match_time = found.match_time;
-  result.motion_time = found.motion_time + step.time;
+  reportMatches(pair, step.rejected_features, result);
+  result.motion_time += step.time;
   reportRig(rig, result);
   result.used_readout = shutter.readout();
   return result;

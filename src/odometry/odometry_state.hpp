@@ -2,42 +2,22 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
-#include <limits>
 #include <optional>
-#include <string>
-#include <vector>
 
-#include "../belief/belief.hpp"
 #include "../belief/motion_hypotheses.hpp"
 #include "../belief/motion_prior.hpp"
 #include "../belief/pose_covariance.hpp"
-#include "../map/floor.hpp"
 #include "../map/local_map.hpp"
 #include "../rig/learnt_rig.hpp"
 #include "../rig/repeated_images.hpp"
 #include "../rig/rolling_shutter.hpp"
+#include "odometry_step.hpp"
 #include "outage.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
-
-/// A pair's state, and its motion since the last pose.
-struct OdometryStep {
-  TrackingState state = TrackingState::kWaiting;
-  std::string reason;
-  double probability = std::numeric_limits<double>::quiet_NaN();  ///< that a measured motion is the camera's
-  std::optional<Eigen::Isometry3d> T_previous_current;
-  Matrix6d covariance = Matrix6d::Zero();  ///< of that motion
-  Vector6d correction = Vector6d::Zero();  ///< see OdometryResult
-  std::vector<int> rejected_features;      ///< matched features of the pair that the adjustment does not confirm
-  double dt = 0.0;                         ///< see OdometryResult, s
-  double time = 0.0;                       ///< of computation, s
-  bool changes_epoch = false;              ///< the motion is not since the last reported pose
-
-  bool hasPose() const { return state == TrackingState::kTracking || state == TrackingState::kDegraded; }
-};
 
 /// A map that another one replaced after an outage, and the last pose in it. Foreign images may have begun the other
 /// one, so a lost camera is also looked for in this map.
@@ -49,13 +29,6 @@ struct EarlierMap {
   int epoch;
 };
 
-/// Alignment of patches under the odometry's noise.
-inline PatchAlignmentOptions alignmentWith(const NoiseOptions& noise) {
-  PatchAlignmentOptions alignment;
-  alignment.noise = noise;
-  return alignment;
-}
-
 /// The memory of the odometry from pair to pair.
 struct OdometryState {
   std::optional<LocalMap> map;
@@ -65,7 +38,7 @@ struct OdometryState {
   std::optional<LocalMap> fallback_map;
   bool fallback_has_pose = false;  ///< its pose is that of the guesses
   std::optional<EarlierMap> earlier;
-  std::optional<RolledPair> newest;  ///< that joined the map or the fallback map; only with a rolling shutter
+  std::optional<RolledPair> newest_rolled;  ///< the newest pair of map or fallback map; only with a rolling shutter
   LearntRig rig;
   RollingShutter shutter;
   MotionPrior prior;
@@ -73,9 +46,9 @@ struct OdometryState {
   Outage outage;
   RepeatedImages images;
   FloorBelief floor;
-  std::optional<StereoCamera> camera;      ///< of the map's pixels
-  std::optional<std::int64_t> lens_stamp;  ///< ns, of the last pair whose camera_info was not refuted
-  std::optional<StereoCamera> lens;        ///< of the last pair's pixels: as camera_info said, unless images refuted it
+  std::optional<StereoCamera> map_camera;         ///< of the map's pixels
+  std::optional<StereoCamera> pair_camera;        ///< SearchedPair::camera of the last pair
+  std::optional<std::int64_t> camera_info_stamp;  ///< ns, of the last pair whose camera_info was not refuted
   std::optional<std::int64_t> last_stamp;
   Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
   PoseCovariance covariance;                    ///< of that pose
@@ -110,6 +83,8 @@ struct OdometryState {
   void startAgain();
   /// The camera is found in the earlier map: epoch and pose are those of that map again.
   void returnToEarlierMap();
+  /// The pair's motion is measured in the map.
+  void endOutage(bool is_earlier_map);
   /// The maps are of no use for the next pairs.
   void forgetMaps() { map.reset(), earlier.reset(); }
   /// The fallback map becomes the map.
@@ -120,25 +95,8 @@ struct OdometryState {
 
   void move(const Eigen::Isometry3d& T_previous_current);
 
-  /// `given_indices`: for each feature its index in the pair as given.
-  OdometryResult report(const StereoFeatures& features, const std::vector<int>& given_indices,
-                        const MotionHypothesis& found, const OdometryStep& step,
+  OdometryResult report(const SearchedPair& pair, const OdometryStep& step,
                         const std::optional<Floor>& known_floor) const;
 };
-
-// Steps of pairs whose motion is not measured: unmeasured_step.cpp.
-
-constexpr const char* kStartedAgain = "started again from the last pose; the motion in between is unknown";
-
-/// Begins a map with the pair: the first one, or at the guesses' pose, or at the last pose. While there is a map from
-/// before the outage, the odometry is lost until the next pair is found in either.
-OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures& features, OdometryState& state);
-
-/// Repeated images contain no motion: the pose stays, and the possible motion widens its covariance.
-OdometryStep holdPose(double dt, OdometryState& state);
-
-/// Moves the pose by the guess or the velocity, else the odometry is lost. `failure`: why no motion is measured.
-OdometryStep predictMotion(const VisualOdometryOptions& options, const StereoFeatures& features, double dt,
-                           const std::string& failure, OdometryState& state);
 
 }  // namespace sdvo

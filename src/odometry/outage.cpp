@@ -48,10 +48,6 @@ Matrix6d Outage::covarianceOf(const MotionGuess& guess, const Matrix6d& process_
   return variance.asDiagonal();
 }
 
-Matrix6d Outage::growth(const MotionPrior& prior, double dt) const {
-  return prior.outageCovariance(seconds_) - prior.outageCovariance(seconds_ - dt);
-}
-
 void Outage::end() {
   distance_ = angle_ = seconds_ = 0.0;
   predicted_pairs_ = 0;

@@ -26,10 +26,11 @@ class Outage {
   /// None if a guess is missing since the last pose.
   const std::optional<GuessedMotion>& guessedMotion() const { return guessed_motion_; }
 
+  double seconds() const { return seconds_; }
   /// Covariance, m^2 and rad^2, by which the unknown motion of the outage grew in the last `dt` s.
-  Matrix6d growth(const MotionPrior& prior, double dt) const;
-  /// Covariance of the unknown motion in the last `dt` s alone.
-  Matrix6d lastStep(const MotionPrior& prior, double dt) const { return prior.lastStepCovariance(seconds_, dt); }
+  Matrix6d growth(const MotionPrior& prior, double dt) const {
+    return prior.outageCovariance(seconds_) - prior.outageCovariance(seconds_ - dt);
+  }
 
   int predictedPairs() const { return predicted_pairs_; }
   void countPrediction() { ++predicted_pairs_; }

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <optional>
 #include <vector>
 
 #include "../belief/motion_search.hpp"
 #include "../map/reacquisition.hpp"
+#include "../map/window_optimizer.hpp"
 #include "odometry_state.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/motion_guess.hpp"
@@ -13,108 +13,58 @@
 
 namespace sdvo {
 
-/// Searches of a motion near a prediction, and of a place after an outage, with the odometry's options.
-struct SearchTools {
-  explicit SearchTools(const VisualOdometryOptions& options);
+/// Searches and adjustment with the odometry's options. They remember nothing of a pair.
+struct OdometryTools {
+  explicit OdometryTools(const VisualOdometryOptions& options)
+      : motions(options.motion), places(options.motion), revisit(options.motion), optimizer(options.noise) {}
 
-  MotionSearch motions;
-  Reacquisition places;
+  MotionSearch motions;  ///< near a prediction
+  Reacquisition places;  ///< after an outage
+  Revisit revisit;       ///< of key frames that left the map
+  WindowOptimizer optimizer;
 };
 
 /// Log-odds that a motion is not the camera's, above which it is doubtful.
 double largestDoubt(const TrackingOptions& tracking);
 
-/// The search of one pair's motion: in the map's camera, without repeated rows, with the right image rotated back and
-/// synchronous, all rows of one moment. The state does not change; state and features must outlive the search.
-class PairSearch {
- public:
-  PairSearch(const VisualOdometryOptions& options, const SearchTools& tools, const OdometryState& state,
-             const StereoFeatures& given, const std::optional<MotionGuess>& guess);
-  PairSearch(const PairSearch&) = delete;  // its parts refer to each other
-  PairSearch& operator=(const PairSearch&) = delete;
-
-  // The features on their way, each without the error before it, where there is one:
-  // given -> whole(), in the map's pixels -> part(), without repeated rows -> taken(), rotated back -> inStep(), left
-  // and right at one moment -> features(), all rows at one moment.
-
+/// A pair and its motion since the map's newest pair. The motion is searched in the map's camera, without repeated
+/// rows, with the right image rotated back and synchronous, all rows of one moment. Refers to the state and to itself.
+struct SearchedPair {
   enum Kind {
     kNoMap,        ///< no map of its camera: it begins one
     kAfterOutage,  ///< its pose in the map is unknown: it is looked for in all maps
     kFrozen,       ///< its images repeat although the camera moved: nothing is searched
     kContinues,    ///< the pair before has a pose in the map: the motion is searched near the expected one
   };
-  Kind kind() const { return kind_; }
 
-  double dt() const { return dt_; }  ///< since the previous pair, s
-  /// That its images repeat although the camera moved.
-  double logOddsOfFrozen() const { return log_odds_of_frozen_; }
+  /// Searches the motion; the state does not change. State and features must outlive the pair.
+  SearchedPair(const VisualOdometryOptions& options, const OdometryTools& tools, const OdometryState& state,
+               const StereoFeatures& given, const std::optional<MotionGuess>& guess);
+  SearchedPair(const SearchedPair&) = delete;
+  SearchedPair& operator=(const SearchedPair&) = delete;
 
-  /// All features in the map's camera.
-  const StereoFeatures& whole() const { return refocused_ ? *refocused_ : given_; }
-  /// Features without those that repeat the previous pair's; the right camera's learnt rotation is undone.
-  const StereoFeatures& taken() const { return rotated_back_ ? *rotated_back_ : part(); }
-  /// The same at the left image's moment, in all rows: the motion is found with these.
-  const StereoFeatures& features() const { return global_ ? *global_ : inStep(); }
-  /// For each of features() its index in the pair as given.
-  const std::vector<int>& givenIndices() const { return new_features_; }
-  bool repeatsAPart() const { return new_part_.has_value(); }
-  /// The camera whose pixels these are: the pair's, or that of the pair before if the images refute a change.
-  const StereoCamera& lens() const { return lens_; }
-  bool refutesCamera() const { return lens_ != given_.camera; }
+  Kind kind = kNoMap;
+  double dt = 0.0;                           ///< since the previous pair, s
+  StereoCamera camera;                       ///< of its pixels: as camera_info says, else that of the pair before
+  bool refutes_camera_info = false;          ///< the images show that a change of camera_info is wrong
+  double log_odds_of_frozen = kUnsuspected;  ///< that its images repeat although the camera moved
+  bool repeats_a_part = false;               ///< some rows repeat those of the previous pair
 
-  /// New rotation of the right camera, for which features are compensated if it is likely.
-  const RotationHypothesis& rotation() const { return rotation_; }
-  /// The pair before its rows were moved to the stamp; only with a rolling shutter.
-  std::optional<RolledPair>& rolled() { return rolled_; }
+  StereoFeatures whole;            ///< all features in the map's pixels
+  std::vector<int> given_indices;  ///< of the features below, which do not repeat the previous pair's, as given
+  StereoFeatures rotated_back;     ///< without the right camera's learnt rotation
+  StereoFeatures features;         ///< of one moment, too: both views and all rows. The motion is found with these
 
-  /// Where the motion is searched; none for a first pair or a frozen one.
-  const std::optional<MotionScene>& scene() const { return scene_; }
-  const MotionHypothesis& found() const { return found_; }
-  MotionHypothesis& found() { return found_; }
+  RotationHypothesis rotation;       ///< a new one of the right camera, which is compensated if it is likely
+  std::optional<RolledPair> rolled;  ///< the pair before its rows were moved to the stamp; only with a rolling shutter
+  std::optional<LocalMap> unrolled_map;  ///< the map whose newest pair is moved by the velocity at it, known by now
+  std::optional<MotionScene> scene;      ///< where the motion is searched; none for a first pair or a frozen one
+  bool in_fallback_map = false;          ///< the scene is of the fallback map
+  bool in_earlier_map = false;           ///< the scene is of the map from before a restart
+  MotionHypothesis found;
 
- private:
-  const StereoFeatures& part() const { return new_part_ ? *new_part_ : whole(); }
-  /// Both sides at the left image's moment, if a delay is known.
-  const StereoFeatures& inStep() const { return synchronised_ ? *synchronised_ : taken(); }
-
-  void take(const StereoCamera& lens);
-  void searchBy(const StereoCamera& lens);
-  bool movesFeatures(const StereoCamera& before) const;
-  double logLikelihood() const;
-  std::optional<Eigen::Isometry3d> expectedMotion(const std::optional<MotionGuess>& guess) const;
-  double findRepeated() const;
-  void compensate(const Eigen::Vector3d& new_rotation);
-  std::optional<StereoFeatures> synchronised(const Vector6d& velocity) const;
-  void roll(const Vector6d& velocity);
-  bool rollAgain();
-  // Each repeats the one before it with features that are compensated better.
-  Vector6d find();
-  Vector6d findSynchronised();
-  Vector6d findGlobal();
-  RotationHypothesis rotationBeyond(const Eigen::Vector3d& compensated);
-  void findRotated();
-  void tryYaw();
-  MotionScene sceneOf(const LocalMap& map, double dt, const std::optional<MotionGuess>& guess) const;
-  std::optional<MotionScene> reacquired() const;
-
-  const VisualOdometryOptions& options_;
-  const SearchTools& tools_;
-  const OdometryState& state_;
-  const StereoFeatures& given_;
-  const std::optional<MotionGuess>& guess_;
-  StereoCamera lens_;
-  Kind kind_ = kNoMap;
-  double dt_ = 0.0;
-  double log_odds_of_frozen_ = kUnsuspected;
-  std::vector<int> new_features_;
-  std::optional<StereoFeatures> refocused_, new_part_, rotated_back_, synchronised_;
-  std::optional<RolledPair> rolled_;      // only with a rolling shutter, as the next three
-  std::optional<StereoFeatures> global_;  // rows moved to the stamp
-  std::optional<RolledPair> newest_;      // of the map, with its velocity since the pair's motion is known
-  std::optional<LocalMap> map_;           // with this velocity
-  RotationHypothesis rotation_;
-  std::optional<MotionScene> scene_;
-  MotionHypothesis found_;
+  /// From the reference of the motion, s. There must be a scene.
+  double sinceReference() const { return scene->map.secondsUntil(features); }
 };
 
 }  // namespace sdvo

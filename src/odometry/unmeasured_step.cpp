@@ -1,4 +1,3 @@
-#include <algorithm>
 
 #include "odometry_state.hpp"
 
@@ -36,17 +35,6 @@ OdometryStep stepWithoutMotion(TrackingState tracking, const std::string& reason
   return step;
 }
 
-/// Begins the fallback map with the pair, at the pose by guesses, else at the last pose (`guessed` is null).
-void beginFallbackMap(const VisualOdometryOptions& options, const StereoFeatures& features,
-                      const Outage::GuessedMotion* guessed, OdometryState& state) {
-  const Eigen::Isometry3d T_previous_current = guessed ? guessed->motion : Eigen::Isometry3d::Identity();
-  state.fallback_map.emplace(options.map);
-  state.fallback_map->insert(alignmentWith(options.noise), features, state.pairs,
-                             (state.T_origin_camera * T_previous_current).inverse(), {},
-                             state.rig.calibration.calibration());
-  state.fallback_has_pose = guessed && !guessed->rotation_only;
-}
-
 }  // namespace
 
 /// In this order:
@@ -65,7 +53,11 @@ OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures
     return stepWithoutMotion(state.started ? TrackingState::kLost : TrackingState::kWaiting, missing(features));
 
   const bool is_guessed = state.started && guessed;
-  beginFallbackMap(options, features, is_guessed ? &*guessed : nullptr, state);
+  const Eigen::Isometry3d T_previous_current = is_guessed ? guessed->motion : Eigen::Isometry3d::Identity();
+  state.fallback_map.emplace(options.map);
+  state.fallback_map->insert(features, state.pairs, (state.T_origin_camera * T_previous_current).inverse(), {},
+                             state.rig.calibration.calibration());
+  state.fallback_has_pose = is_guessed && !guessed->rotation_only;
 
   // The fallback map replaces a map from before the outage only when a pair is measured against it.
   const bool has_map = state.started && state.map && state.map->continuedBy(features);
@@ -97,7 +89,7 @@ OdometryStep holdPose(double dt, OdometryState& state) {
                     : "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
   step.T_previous_current = Eigen::Isometry3d::Identity();
   // Velocities of successive steps are correlated: the pose gets what this step adds to all, the motion its own part.
-  step.covariance = state.outage.lastStep(state.prior, dt);
+  step.covariance = state.prior.lastStepCovariance(state.outage.seconds(), dt);
   state.covariance.predict(*step.T_previous_current, state.outage.growth(state.prior, dt));
   state.prior.interrupt();
   return step;

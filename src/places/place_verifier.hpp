@@ -9,7 +9,6 @@
 #include "../matching/view_matcher.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 #include "stereo_descriptor_vo/places/place.hpp"
 
 namespace sdvo {
@@ -19,7 +18,7 @@ class PlaceVerifier {
  public:
   static constexpr int kLeastInliers = 40;  ///< fewer are not the same place
 
-  PlaceVerifier() : views_(matcherOptions(), estimatorOptions()) {}
+  PlaceVerifier() : views_(estimatorOptions()) {}
 
   PlaceMatch verify(const StereoFeatures& place, const StereoFeatures& current) const {
     const auto [matches, correspondences, motion] = views_.match(place, current, RigCalibration());
@@ -56,13 +55,6 @@ class PlaceVerifier {
   // Thresholds of the same place (chosen).
   static constexpr double kLeastRatio = 0.3;      // inliers per match
   static constexpr double kLeastCoverage = 0.25;  // by inliers, share of an 8x4 grid over the image
-
-  static FeatureMatcherOptions matcherOptions() {
-    FeatureMatcherOptions matcher;
-    matcher.gating = false;      // the relative pose is unknown
-    matcher.max_distance = 0.3;  // share of the bits
-    return matcher;
-  }
 
   static MotionEstimatorOptions estimatorOptions() {
     MotionEstimatorOptions estimator;

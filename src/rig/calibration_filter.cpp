@@ -35,10 +35,6 @@ CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : option
   calibration_.value = compensated_.head<RigCalibration::kParameters>();
 }
 
-const CalibrationFilter::Likelihood& CalibrationFilter::pastBefore(int oldest_id) const {
-  return next_past_id_ >= 0 && next_past_id_ < oldest_id ? next_past_ : past_;
-}
-
 CalibrationBelief CalibrationFilter::prior(const RigEstimate::Shape& shape) const {
   constexpr double kExact = 0.01;  // px: 0.1 % of the depth at 10 px of disparity; less is ill-conditioned
   CalibrationBelief belief;
@@ -116,7 +112,7 @@ void CalibrationFilter::update(int oldest_id, int newest_id, const RigEstimate::
   const RigCalibration::Vector own_mean =
       own * (calibration.value + by_delay) + kRealInformation * prior.information * (calibration.value - prior.mean);
   // 2. Add it to the windows before that share no pair with it.
-  past_ = pastBefore(oldest_id);
+  if (next_past_id_ >= 0 && next_past_id_ < oldest_id) past_ = next_past_;
   present_ = Likelihood{past_.information + shape.transpose() * own * shape,
                         past_.information_mean + shape.transpose() * own_mean};
   // 3. It is the past of windows that begin after its last pair.

@@ -66,7 +66,6 @@ class CalibrationFilter {
     RigEstimate::Vector information_mean = RigEstimate::Vector::Zero();  ///< information * mean
   };
 
-  const Likelihood& pastBefore(int oldest_id) const;
   /// Posterior of the rig: mean and covariance of a mixture of eight components, each with an error, or none, of
   /// disparity, roll and delay.
   RigEstimate posterior(const Likelihood& windows) const;

@@ -85,6 +85,25 @@ RotationHypothesis LearntRig::rotationHypothesis(const StereoFeatures& features,
   return hypothesis;
 }
 
+std::vector<RowMotion> LearntRig::rowMotions(const StereoFeatures& features, const MotionHypothesis& found,
+                                             double dt) const {
+  const StereoCamera& camera = features.camera;
+  const double delay = features.right_delay + calibration.delay();
+  // Mean rows of other pairs' right images contain the delay itself: subtracting them would hide it.
+  const bool has_pattern = !row_pattern.isOfOtherPairs(dt);
+  std::vector<RowMotion> rows;
+  rows.reserve(found.motion.inliers.size());
+  for (const int i : found.motion.inliers) {
+    const auto [reference, current, distance] = found.matches[i];
+    const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
+    const double velocity = (camera.project(now).y() - found.view->pixels[reference].y) / dt;
+    const double dv = has_pattern ? row_pattern.change(features, current) : features.dv[current];
+    rows.push_back({velocity, dv - delay * velocity,
+                    RowDelay::partOf(features.u[current], features.v[current], camera.width, camera.height)});
+  }
+  return rows;
+}
+
 RigEstimate::Matrix LearntRig::rotate(const RotationHypothesis& new_rotation, const StereoCamera& camera) {
   const Eigen::Vector3d now = rotation + new_rotation.value, back = now - rotation_before_;
   const Eigen::Matrix3d covariance = rotation_covariance + new_rotation.covariance;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <limits>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,7 +39,7 @@ struct RotationHypothesis {
 /// Estimates of a rig's calibration, rows, rotation, delay and noise, from its pairs.
 struct LearntRig {
   CalibrationFilter calibration;
-  RowPattern row_pattern{RowDelay::kMemory};  ///< mean over confirmed pairs
+  RowPattern row_pattern;  ///< mean over confirmed pairs
   /// Rotation of the right camera since the map began, rad. Features are rotated back by it before all other steps.
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Zero();
@@ -56,6 +55,9 @@ struct LearntRig {
   RotationHypothesis rotationHypothesis(const StereoFeatures& features, const MotionHypothesis& found,
                                         const Eigen::Vector3d& compensated, const Eigen::Matrix3d& turns,
                                         double dt) const;
+
+  /// Rows of the motion's inliers over the last `dt` s, with the motion's velocities, because corners have more noise.
+  std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt) const;
 
   /// Adds a new rotation, and returns how uncertain it leaves the rig. A rotation that undoes the last one counts as
   /// noise of this rig.

@@ -23,7 +23,7 @@ std::vector<bool> movedBy(const Eigen::Isometry3d& T_previous_current, const Ste
   std::vector<bool> moved(features.u.size());
   for (int i = 0; i < features.count(); ++i) {
     const Eigen::Vector3d now = features.camera.project(T_current_previous * features.point(i));
-    moved[static_cast<std::size_t>(i)] = std::hypot(now.x() - features.u[i], now.y() - features.v[i]) > noise;
+    moved[i] = std::hypot(now.x() - features.u[i], now.y() - features.v[i]) > noise;
   }
   return moved;
 }
@@ -80,7 +80,7 @@ std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, dou
   if (all_old < kFewestMeasured || count - all_old < kFewestMeasured) return indices;
   std::sort(order.begin(), order.end(), [&](int a, int b) { return features.v[a] < features.v[b]; });
   std::vector<int> old{0};  // old[k]: repeated ones among the uppermost k
-  for (const int i : order) old.push_back(old.back() + repeated[static_cast<std::size_t>(i)]);
+  for (const int i : order) old.push_back(old.back() + repeated[i]);
   int best = 0, border = 0;
   bool is_above = false;  // the repeated part is above the border
   for (int k = 0; k <= count; ++k) {
@@ -92,8 +92,7 @@ std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, dou
   // Given a border, labels (repeated or new) need fewer nats. The best of count + 1 random borders must save less.
   const double saved = entropyOf(all_old, count) - entropyOf(count - best, count);
   if (saved < std::log((count + 1) / kTailProbability)) return indices;
-  const float tear =
-      features.v[order[static_cast<std::size_t>(std::clamp(is_above ? border : border - 1, 0, count - 1))]];
+  const float tear = features.v[order[std::clamp(is_above ? border : border - 1, 0, count - 1)]];
   // A descriptor across the tear has content of two moments.
   const auto is_old = [&](int i) {
     const float below = features.v[i] - tear;

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
-#include <vector>
 
 #include "../common/statistics.hpp"
 #include "../motion/noise.hpp"
+#include "rolling_shutter.hpp"
 
 namespace sdvo {
 namespace {
@@ -112,14 +112,26 @@ void RightCameraDelay::updateOtherPair(const std::vector<RowMotion>& rows, doubl
 void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Vector6d& velocity, double known,
                              bool is_confirmed) {
   if (!is_confirmed) return interrupt();
-  StereoFeatures positions;
-  positions.camera = features.camera;
-  positions.u = features.u, positions.v = features.v;
-  positions.disparity = features.disparity, positions.dv = features.dv;
-  positions.right_delay = features.right_delay;
-  pairs_.push_back({std::move(positions), velocity});
+  pairs_.push_back({features, velocity});
   if (pairs_.size() < 4) return;
-  addRows(dt, known);
+  // Rows of the third last pair, between intervals of known velocity. The instrument is the mean over the four
+  // intervals around it: it lacks motions too fast for the rate of pairs.
+  const StereoFeatures& middle = pairs_[1].features;
+  const StereoCamera& camera = middle.camera;
+  const double stamped = middle.right_delay, delay = stamped + known;
+  const Vector6d near = pairs_[1].velocity + pairs_[2].velocity, far = pairs_[0].velocity + pairs_[3].velocity;
+  const Vector6d at = velocityAmong(pairs_[0].velocity, pairs_[1].velocity, pairs_[2].velocity, pairs_[3].velocity);
+  const Vector6d during = velocityDuring(delay, dt, pairs_[1].velocity, at, pairs_[2].velocity);
+  const Vector6d slow = 0.25 * (near + far);
+  std::vector<RowDelay::Sample> rows;
+  rows.reserve(middle.u.size());
+  for (int i = 0; i < middle.count(); ++i) {
+    const Synchronised step = sdvo::synchronised(middle, i, delay, during);
+    const RightFlow turning = rightFlow(camera, slow, middle.u[i] - middle.disparity[i], middle.v[i]);
+    rows.push_back({RowDelay::partOf(middle.u[i], middle.v[i], camera.width, camera.height),
+                    middle.dv[i] - stamped * step.flow.y(), step.flow.y(), turning.far.y(), step.disparity});
+  }
+  rows_.add(rows);
   pairs_.pop_front();
 }
 
@@ -132,27 +144,6 @@ std::string RightCameraDelay::OtherPair::words() const {
   words << "the right image seemed to be that of another pair, taken " << std::round(1e3 * std::abs(delay)) << " ms "
         << (delay < 0.0 ? "earlier" : "later");
   return words.str();
-}
-
-/// Adds the rows of the third last pair, between intervals of known velocity.
-void RightCameraDelay::addRows(double dt, double known) {
-  const StereoFeatures& features = pairs_[1].features;
-  const double stamped = features.right_delay, delay = stamped + known;
-  // Velocity at the pair, to the fourth order, from the means over the four intervals around it. The instrument is
-  // their mean: it lacks motions too fast for the rate of pairs.
-  const Vector6d near = pairs_[1].velocity + pairs_[2].velocity, far = pairs_[0].velocity + pairs_[3].velocity;
-  const Vector6d at = (7.0 * near - far) / 12.0;
-  const Vector6d during = velocityDuring(delay, dt, pairs_[1].velocity, at, pairs_[2].velocity);
-  const Vector6d slow = 0.25 * (near + far);
-  std::vector<RowDelay::Sample> rows;
-  rows.reserve(features.u.size());
-  for (int i = 0; i < features.count(); ++i) {
-    const Synchronised step = sdvo::synchronised(features, i, delay, during);
-    const RightFlow turning = rightFlow(features.camera, slow, features.u[i] - features.disparity[i], features.v[i]);
-    rows.push_back({RowDelay::partOf(features.u[i], features.v[i], features.camera.width, features.camera.height),
-                    features.dv[i] - stamped * step.flow.y(), step.flow.y(), turning.far.y(), step.disparity});
-  }
-  rows_.add(rows);
 }
 
 StereoFeatures RightCameraDelay::synchronised(const StereoFeatures& features, double dt, const Vector6d& velocity,

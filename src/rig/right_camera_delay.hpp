@@ -51,10 +51,9 @@ class RightCameraDelay {
 
  private:
   struct Pair {
-    StereoFeatures features;  ///< positions only
-    Vector6d velocity;        ///< mean over the interval before it
+    StereoFeatures features;
+    Vector6d velocity;  ///< mean over the interval before it
   };
-  void addRows(double dt, double known);
 
   RowDelay rows_;
   std::deque<Pair> pairs_;  ///< the last ones

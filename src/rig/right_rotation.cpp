@@ -58,23 +58,10 @@ struct AddRotationEquations {
       const DoubleLanes of_u[] = {a, left, left * at.y, a * at.z - left * at.x, -a * at.y};
       const DoubleLanes of_v[] = {b, down, down * at.y - b * at.z, -down * at.x, b * at.x};
       const DoubleLanes of_disparity[] = {nearer, nearer * at.y, -nearer * at.x, turned[0], turned[1], turned[2]};
-      addRow(of_u, {0, 2, 3, 4, 5}, weight, u, hessian, gradient);
-      addRow(of_v, {1, 2, 3, 4, 5}, weight, v, hessian, gradient);
-      addRow(of_disparity, {2, 3, 4, 6, 7, 8}, weight, disparity, hessian, gradient);
+      addRow<kUnknowns>(of_u, {0, 2, 3, 4, 5}, weight, u, hessian, gradient);
+      addRow<kUnknowns>(of_v, {1, 2, 3, 4, 5}, weight, v, hessian, gradient);
+      addRow<kUnknowns>(of_disparity, {2, 3, 4, 6, 7, 8}, weight, disparity, hessian, gradient);
       for (int i = 0; i < kUnknowns; ++i) store(gradient[i], gradients + i * stride + k);
-    }
-  }
-
-  template <int kCount>
-  static SDVO_IN_KERNEL void addRow(const DoubleLanes (&row)[kCount], const int (&columns)[kCount],
-                                    const DoubleLanes& weight, const DoubleLanes& residual, DoubleLanes* hessian,
-                                    DoubleLanes* gradient) {
-#pragma GCC unroll 6
-    for (int i = 0; i < kCount; ++i) {
-      const DoubleLanes weighted = weight * row[i];
-      gradient[columns[i]] += weighted * residual;
-#pragma GCC unroll 6
-      for (int j = i; j < kCount; ++j) hessian[kUnknowns * columns[i] + columns[j]] += weighted * row[j];
     }
   }
 };
@@ -125,8 +112,7 @@ Linearisation linearise(const Inliers& inliers, const Eigen::Isometry3d& T, cons
   result.gradients.fill(UnknownsVector::Zero());
   for (std::size_t k = 0; k < inliers.parts.size(); ++k)
     for (int i = 0; i < kUnknowns; ++i)
-      result.gradients[static_cast<std::size_t>(inliers.parts[k])][i] +=
-          columns[static_cast<std::size_t>(i * stride) + k];
+      result.gradients[inliers.parts[k]][i] += columns[static_cast<std::size_t>(i * stride) + k];
   return result;
 }
 
@@ -178,7 +164,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
   std::vector<int> parts;
   some.reserve(inliers.size()), parts.reserve(inliers.size());
   for (const int i : inliers) {
-    const Correspondence& c = some.emplace_back(correspondences[static_cast<std::size_t>(i)]);
+    const Correspondence& c = some.emplace_back(correspondences[i]);
     parts.push_back(RowDelay::partOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height));
   }
   const Inliers observed{camera, noise.corner, disparity_sigma, CorrespondenceArrays(some), std::move(parts)};

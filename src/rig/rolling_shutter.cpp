@@ -20,6 +20,14 @@ Eigen::Matrix3d gainOfRows(const RateByRows& rate, double variance) {
 
 }  // namespace
 
+std::optional<LeftResidual> leftResidual(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
+                                         const Eigen::Vector3d& point, const Eigen::Vector2d& measured) {
+  const Eigen::Vector3d here = T_current_reference * point;
+  if (!(here.z() > camera.nearestDepth())) return std::nullopt;
+  return LeftResidual{motionJacobian(camera, T_current_reference, point).topRows<2>(),
+                      measured - camera.project(here).head<2>()};
+}
+
 StereoFeatures RollingShutter::asGlobal(const RolledPair& pair) {
   const StereoCamera& camera = pair.features.camera;
   StereoFeatures result = pair.features;
@@ -55,18 +63,17 @@ std::optional<RateByRows> RollingShutter::rateByRows(const RolledPair& pair, con
     Vector product = Vector::Zero();
     for (std::size_t k = 0; k < found.sightings.size(); ++k) {
       const LocalMap::Sighting& sighting = found.sightings[k];
-      const FeatureMatch& match = found.matches[static_cast<std::size_t>(found.motion.inliers[k])];
-      const Eigen::Vector3d& point = found.view->points.positions[static_cast<std::size_t>(match.reference)];
-      const Eigen::Vector3d here = T * point;
-      if (!(here.z() > camera.nearestDepth())) continue;
-      const Eigen::Matrix<double, 2, 6> by_pose = motionJacobian(camera, T, point).topRows<2>();
+      const FeatureMatch& match = found.matches[found.motion.inliers[k]];
+      const Eigen::Vector3d& point = found.view->points.positions[match.reference];
+      const auto residual = leftResidual(camera, T, point, sighting.measurement.head<2>());
+      if (!residual) continue;
+      const double moved_by = pair.readout * rowTime(camera, pair.features.v[match.current]);  // s
       Eigen::Matrix<double, 2, 9> jacobian;
-      jacobian << by_pose, -pair.readout * rowTime(camera, pair.features.v[match.current]) * by_pose.rightCols<3>();
-      const Eigen::Vector2d residual = (sighting.measurement - camera.project(here)).head<2>();
-      const double square = (residual - jacobian * error).squaredNorm();
+      jacobian << residual->by_pose, -moved_by * residual->by_pose.rightCols<3>();
+      const double square = (residual->value - jacobian * error).squaredNorm();
       const double weight = 1.0 / (sighting.sigma * sighting.sigma + square);  // Cauchy's kernel
       information += weight * jacobian.transpose() * jacobian;
-      product += weight * jacobian.transpose() * residual;
+      product += weight * jacobian.transpose() * residual->value;
     }
     error = information.ldlt().solve(product);
   }
@@ -84,8 +91,7 @@ double RollingShutter::varianceAt(const RolledPair& pair) const {
 
 Vector6d RollingShutter::velocityAt(const RolledPair& pair) const {
   Vector6d velocity = pair.mean_velocity.value_or(Vector6d::Zero());
-  if (pair.mean_velocity && pair.mean_velocity_before)
-    velocity += 0.25 * (*pair.mean_velocity - *pair.mean_velocity_before);
+  if (pair.mean_velocity && pair.mean_velocity_before) velocity = velocityAfter(*pair.mean_velocity_before, velocity);
   if (!pair.rate_by_rows) return velocity;
   const Eigen::Matrix3d gain = pair.mean_velocity ? gainOfRows(*pair.rate_by_rows, varianceAt(pair))
                                                   : Eigen::Matrix3d(Eigen::Matrix3d::Identity());

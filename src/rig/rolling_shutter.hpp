@@ -14,6 +14,29 @@ inline double rowTime(const StereoCamera& camera, double v) {
   return (v + 0.5) / camera.height - 0.5;
 }
 
+/// Velocity at a stamp, from the mean over the interval before it and over the one before that (RollingShutter).
+template <class Velocity>
+Velocity velocityAfter(const Velocity& mean_before, const Velocity& mean) {
+  return mean + 0.25 * (mean - mean_before);
+}
+
+/// Velocity at a stamp to the fourth order, from the means over the two intervals before it and the two after it
+/// (Colella and Woodward 1984).
+template <class Velocity>
+Velocity velocityAmong(const Velocity& before_last, const Velocity& last, const Velocity& next,
+                       const Velocity& after_next) {
+  return (7.0 * (last + next) - (before_last + after_next)) / 12.0;
+}
+
+/// How a position in the left image depends on the pair's motion.
+struct LeftResidual {
+  Eigen::Matrix<double, 2, 6> by_pose;  ///< derivative of the projection by the motion's left perturbation
+  Eigen::Vector2d value;                ///< measured - projected, px
+};
+/// Of a point of the reference under T_current_reference; none if it is not in front of the camera.
+std::optional<LeftResidual> leftResidual(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
+                                         const Eigen::Vector3d& point, const Eigen::Vector2d& measured);
+
 /// Rate of the camera's rotation at the stamp, rad/s about its axes, by the rows of one pair against the map.
 struct RateByRows {
   Eigen::Vector3d value;

@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-namespace sdvo {
+#include "../common/statistics.hpp"
 
+namespace sdvo {
 namespace {
 
 Eigen::Vector3d motionOf(const RowDelay::Sample& row) {
@@ -21,14 +22,6 @@ Eigen::Vector2d instruments(const Eigen::Vector3d& motion) {
 }
 
 }  // namespace
-
-int RowDelay::partOf(double u, double v, int width, int height) {
-  // Clamped before it becomes an integer, which a position far outside of the image overflows.
-  const auto index = [](double position, int size, int count) {
-    return static_cast<int>(std::clamp(position * count / size, 0.0, count - 1.0));
-  };
-  return index(v, height, kRows) * kColumns + index(u, width, kColumns);
-}
 
 double RowDelay::Estimate::significantValue() const {
   return std::copysign(std::sqrt(std::max(value * value - kSquare * sigma * sigma, 0.0)), value);
@@ -58,35 +51,8 @@ void RowDelay::Sums::add(double w, const Eigen::Vector3d& moved, double lower) {
   product += w * lower * moved;
 }
 
-/// Sums over the previous pairs, with the weight that a new pair leaves them.
-RowDelay::Parts RowDelay::forgotten() const {
-  Parts past = parts_;
-  for (Sums& part : past) {
-    part.weight *= memory_, part.dv *= memory_;
-    part.motion *= memory_, part.square *= memory_, part.product *= memory_;
-  }
-  return past;
-}
-
-RowDelay::Parts RowDelay::sumsOf(const std::vector<Sample>& pair, const std::vector<double>& weights) {
-  Parts sums;
-  for (std::size_t i = 0; i < pair.size(); ++i)
-    sums[static_cast<std::size_t>(pair[i].part)].add(weights[i], motionOf(pair[i]), pair[i].dv);
-  return sums;
-}
-
 double RowDelay::Sums::residual(const Eigen::Vector2d& value, const Eigen::Vector3d& moved, double lower) const {
   return lower - meanDv() - value.dot(regressors(moved - meanMotion()));
-}
-
-/// Sum over a pair's parts of instruments times residual.
-Eigen::Vector2d RowDelay::gradientOf(const Parts& now, const Eigen::Vector2d& value) const {
-  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
-  for (std::size_t part = 0; part < now.size(); ++part)
-    if (now[part].weight > 0.0)
-      gradient += now[part].weight * parts_[part].residual(value, now[part].meanMotion(), now[part].meanDv()) *
-                  instruments(now[part].meanMotion() - parts_[part].meanMotion());
-  return gradient;
 }
 
 /// Each part of the pair is one observation: the mean of its samples, weighted by a Huber kernel. Differences within a
@@ -97,27 +63,34 @@ void RowDelay::add(const std::vector<Sample>& pair) {
   for (const Sample& row : pair) square += row.turning * row.turning;
   if (!(square > least_turning_ * least_turning_ * static_cast<double>(pair.size()))) return;
 
-  const Parts past = forgotten();
+  Parts past = parts_;
+  for (Sums& part : past) {
+    part.weight *= memory_, part.dv *= memory_;
+    part.motion *= memory_, part.square *= memory_, part.product *= memory_;
+  }
   std::vector<double> weights(pair.size(), 1.0);
-  Eigen::Vector2d gradient;
+  Parts now;
+  Eigen::Vector2d value;
   for (int pass = 0; pass < kReweightings; ++pass) {
-    const Parts now = sumsOf(pair, weights);
+    now = Parts();
+    for (std::size_t i = 0; i < pair.size(); ++i) now[pair[i].part].add(weights[i], motionOf(pair[i]), pair[i].dv);
     parts_ = past;
     for (std::size_t part = 0; part < now.size(); ++part)
       if (now[part].weight > 0.0) parts_[part].add(now[part].weight, now[part].meanMotion(), now[part].meanDv());
-    const Eigen::Vector2d value = fit(parts_).value;
-    gradient = gradientOf(now, value);
+    value = fit(parts_).value;
     for (std::size_t i = 0; i < pair.size(); ++i) {
-      const Sums& part = parts_[static_cast<std::size_t>(pair[i].part)];
+      const Sums& part = parts_[pair[i].part];
       const double residual = std::abs(part.residual(value, motionOf(pair[i]), pair[i].dv));
       weights[i] = std::min(1.0, kKernel / std::max(residual, 1e-9));
     }
   }
-  addToBlock(gradient);
-}
 
-/// Adds a pair's gradient to its block. Once the block is complete, its gradient's square joins the sum.
-void RowDelay::addToBlock(const Eigen::Vector2d& gradient) {
+  // Instruments times residual. Once the pair's block is complete, the square of its gradient joins the sum.
+  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+  for (std::size_t part = 0; part < now.size(); ++part)
+    if (now[part].weight > 0.0)
+      gradient += now[part].weight * parts_[part].residual(value, now[part].meanMotion(), now[part].meanDv()) *
+                  instruments(now[part].meanMotion() - parts_[part].meanMotion());
   block_ += gradient;
   if (++pairs_ % pairs_of_block_ != 0) return;
   const double memory = std::pow(memory_, pairs_of_block_);
@@ -131,8 +104,7 @@ std::optional<RowDelay::Estimate> RowDelay::estimate() const {
   if (!(freedom > 0.0)) return std::nullopt;
   const Fit fit = this->fit(parts_);
   const Eigen::Matrix2d inverse = fit.information.inverse();
-  // The spread of few blocks is uncertain: Student's distribution, by Wallace's bound of its quantiles.
-  const double student = freedom / kSquare * std::expm1(kSquare / freedom);
+  const double student = freedom / kSquare * studentSquare(kSquare, freedom);  // the spread of few blocks is uncertain
   const Estimate estimate{fit.value[0], std::sqrt(student * (inverse * gradient_squares_ * inverse.transpose())(0, 0))};
   if (!(estimate.sigma < kFail)) return std::nullopt;
   return estimate;

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -41,7 +40,9 @@ class RowDelay {
     double turning;
     double disparity;  ///< px
   };
-  static int partOf(double u, double v, int width, int height);
+  static int partOf(double u, double v, int width, int height) {
+    return gridCell(u, v, width, height, kColumns, kRows);
+  }
 
   struct Estimate {
     double value, sigma;  ///< s
@@ -85,11 +86,6 @@ class RowDelay {
     Eigen::Vector2d value = Eigen::Vector2d::Zero();
   };
   static Fit fit(const Parts& parts);
-
-  Parts forgotten() const;
-  static Parts sumsOf(const std::vector<Sample>& pair, const std::vector<double>& weights);
-  Eigen::Vector2d gradientOf(const Parts& now, const Eigen::Vector2d& value) const;
-  void addToBlock(const Eigen::Vector2d& gradient);
 
   double memory_, least_turning_;
   int pairs_of_block_;

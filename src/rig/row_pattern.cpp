@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cstddef>
-#include <vector>
 
 #include "../belief/motion_hypotheses.hpp"
 #include "right_camera_delay.hpp"
@@ -40,11 +39,10 @@ RowPattern::Parts RowPattern::partsOf(const StereoFeatures& features) {
 void RowPattern::learn(const StereoFeatures& features, const std::vector<RowMotion>& rows) {
   const Parts now = partsOf(features);
   std::array<double, RowDelay::kParts> velocity{}, count{};
-  for (const RowMotion& row : rows)
-    velocity[static_cast<std::size_t>(row.part)] += row.velocity, ++count[static_cast<std::size_t>(row.part)];
+  for (const RowMotion& row : rows) velocity[row.part] += row.velocity, ++count[row.part];
   for (std::size_t p = 0; p < now.size(); ++p) {
     Part& part = parts_[p];
-    part.weight = memory_ * part.weight + now[p].weight;
+    part.weight = RowDelay::kMemory * part.weight + now[p].weight;
     if (!(now[p].weight > 0.0)) continue;
     const double ratio = now[p].weight / part.weight;
     part.dv += ratio * (now[p].dv - part.dv);

@@ -12,12 +12,9 @@
 namespace sdvo {
 
 /// Mean dv (v_right - v_left, px) of a rig in each part of the image. Rectification leaves constant errors in each
-/// part, so only a change against this pattern is evidence of a changed rig.
+/// part, so only a change against this pattern is evidence of a changed rig. Remembers as many pairs as RowDelay.
 class RowPattern {
  public:
-  /// `memory`: factor on the weight of previous pairs with each new pair.
-  explicit RowPattern(double memory) : memory_(memory) {}
-
   /// `rows`: of the pair's inliers, whose velocities the mean rows may depend on.
   void learn(const StereoFeatures& features, const std::vector<RowMotion>& rows = {});
 
@@ -42,7 +39,6 @@ class RowPattern {
   static Parts partsOf(const StereoFeatures& features);
   static std::optional<RightRotation> fit(const Parts& parts);
 
-  double memory_;
   Parts parts_;
 };
 

@@ -3,13 +3,12 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 
+#include "../common/statistics.hpp"
+#include "../motion/motion_refinement.hpp"
 #include "../motion/noise.hpp"
-#include "../motion/pose_problem.hpp"
 #include "rolling_shutter.hpp"
-#include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
 namespace {
@@ -22,7 +21,7 @@ struct Shift {
   /// By the pose (six rows, m and rad), by the readout (s) at the camera's rates of rotation, and by it at slow rates:
   /// the instrument.
   Eigen::Matrix<double, 8, 2> derivative;
-  Eigen::Vector2d residual;  ///< measured - projected, px
+  Eigen::Vector2d residual;  ///< see LeftResidual
 };
 
 using Rates = std::array<Eigen::Vector3d, 2>;  // of rotation at the stamps of the pair before and of the pair, rad/s
@@ -35,13 +34,6 @@ Eigen::Vector2d shiftBy(const Rates& rates, const StereoCamera& camera, const Ei
   const Eigen::Vector3d moved = R_current_previous * rates[0].cross(before);
   return rowTime(camera, row_before) * by_pose.leftCols<3>() * moved -
          rowTime(camera, row_now) * by_pose.rightCols<3>() * rates[1];
-}
-
-/// Factor on a variance that is estimated from `pairs`. With it, RowDelay::kSquare is exceeded as rarely as with a
-/// known variance: Student's distribution (Wallace 1959).
-double studentRatio(double pairs) {
-  const double freedom = pairs - 1.0, correction = (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
-  return pairs * std::expm1(RowDelay::kSquare / freedom * correction * correction) / RowDelay::kSquare;
 }
 
 }  // namespace
@@ -74,16 +66,20 @@ void RowReadout::add(const StereoFeatures& features, const MotionHypothesis& fou
   for (int i = 0; i < features.count(); ++i) last_positions_.emplace_back(features.u[i], features.v[i]);
   if (pairs_.size() <= 2 * kAround) return;
   measure();
-  is_compensated_ = isCompensated();
+  // Compensated from its proof on, until it is no longer significant. A global shutter whose rows are off by a pixel
+  // reaches 3.8 standard deviations (Karlsruhe 19, 373 pairs).
+  constexpr double kProof = 5.0;  // standard deviations (chosen)
+  const auto known = estimate();
+  const bool is_proved = known && known->sigma < kWarn && std::abs(known->value) > kProof * known->sigma;
+  is_compensated_ = known && known->isRolling() && (is_compensated_ || is_proved);
   pairs_.pop_front();
 }
 
 /// Adds the middle one of the pairs to the sums.
 void RowReadout::measure() {
-  // Rate at the stamp of pair `k`, from the means over the intervals around it (Colella and Woodward 1984), and its
-  // binomial mean over five pairs.
-  const auto rateAt = [&](std::size_t k) -> Eigen::Vector3d {
-    return (7.0 * (pairs_[k].rate + pairs_[k + 1].rate) - pairs_[k - 1].rate - pairs_[k + 2].rate) / 12.0;
+  // Rate at the stamp of pair `k`, and its binomial mean over five pairs.
+  const auto rateAt = [&](std::size_t k) {
+    return velocityAmong(pairs_[k - 1].rate, pairs_[k].rate, pairs_[k + 1].rate, pairs_[k + 2].rate);
   };
   const auto slowRateAt = [&](std::size_t k) -> Eigen::Vector3d {
     return (rateAt(k - 2) + 4.0 * rateAt(k - 1) + 6.0 * rateAt(k) + 4.0 * rateAt(k + 1) + rateAt(k + 2)) / 16.0;
@@ -97,15 +93,15 @@ void RowReadout::measure() {
   std::vector<Shift> shifts;
   for (const Track& track : pair.tracks) {
     const Eigen::Vector3d before = camera.backProject(track.before.x(), track.before.y(), track.before.z());
-    const Eigen::Vector3d now = T * before;
-    if (!(now.z() > camera.nearestDepth())) continue;
-    const Eigen::Matrix<double, 2, 6> by_pose = motionJacobian(camera, T, before).topRows<2>();
+    const auto residual = leftResidual(camera, T, before, track.now);
+    if (!residual) continue;
+    const auto& by_pose = residual->by_pose;
     Shift& shift = shifts.emplace_back();
+    shift.residual = residual->value;
     shift.derivative.topRows<6>() = by_pose.transpose();
     for (const auto& [row, rate] : {std::pair(6, &rates), std::pair(7, &slow_rates)})
       shift.derivative.row(row) =
           shiftBy(*rate, camera, T.linear(), before, track.before.y(), track.now.y(), by_pose).transpose();
-    shift.residual = track.now - camera.project(now).head<2>();
   }
   if (static_cast<int>(shifts.size()) < kFewestMeasured) return;
 
@@ -119,7 +115,8 @@ void RowReadout::measure() {
   for (int pass = 0; pass < kPasses; ++pass) {
     square.setZero(), by_residual.setZero();
     for (const Shift& shift : shifts) {
-      const double weight = 1.0 / (kKernelSquare + (shift.residual - shift.derivative.transpose() * fit).squaredNorm());
+      const Eigen::Vector2d left = shift.residual - shift.derivative.transpose() * fit;
+      const double weight = cauchyWeight(left.squaredNorm() / kKernelSquare);
       square += weight * shift.derivative * shift.derivative.transpose();
       by_residual += weight * shift.derivative * shift.residual;
     }
@@ -146,7 +143,10 @@ std::optional<RowReadout::Estimate> RowReadout::estimate() const {
   const double pairs = information_ * information_ / information_square_;  // effective number (Kish 1965)
   if (!(pairs > 1.0)) return std::nullopt;                                 // one pair has no spread
   const double spread = product_square_ - 2.0 * value * mixed_ + value * value * information_square_;
-  const double sigma = std::sqrt(std::max(spread, 0.0) * studentRatio(pairs)) / information_;
+  // The spread of few pairs is uncertain: with this factor, kSquare is exceeded as rarely as with a known variance.
+  const double freedom = pairs - 1.0, correction = (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
+  const double student = pairs * studentSquare(RowDelay::kSquare, freedom, correction) / RowDelay::kSquare;
+  const double sigma = std::sqrt(std::max(spread, 0.0) * student) / information_;
   const Estimate estimate{value, std::hypot(sigma, kModel * value)};
   if (!(estimate.sigma < RowDelay::kFail)) return std::nullopt;
   return estimate;
@@ -173,9 +173,8 @@ Matrix6d RowReadout::momentOf(const StereoFeatures& features, const MotionHypoth
   if (pairs_.empty()) return Matrix6d::Zero();
   const StereoCamera& camera = features.camera;
   const Eigen::Isometry3d& T = found.motion.T_current_reference;
-  // As RollingShutter::velocityAt() and velocityBetween().
   const Eigen::Vector3d rate = logSO3(T.linear().transpose()) / dt, rate_before = pairs_.back().rate;
-  const Rates rates = {0.5 * (rate_before + rate), rate + 0.25 * (rate - rate_before)};
+  const Rates rates = {0.5 * (rate_before + rate), velocityAfter(rate_before, rate)};
   constexpr std::size_t kMost = 64;  // (chosen) for a derivative
   const std::vector<Track> tracks = tracksOf(features, found, kMost);
   if (static_cast<int>(tracks.size()) < kFewestMeasured) return Matrix6d::Zero();
@@ -183,10 +182,10 @@ Matrix6d RowReadout::momentOf(const StereoFeatures& features, const MotionHypoth
   Vector6d product = Vector6d::Zero();
   for (const Track& track : tracks) {
     const Eigen::Vector3d before = camera.backProject(track.before.x(), track.before.y(), track.before.z());
-    const Eigen::Vector3d now = T * before;
-    if (!(now.z() > camera.nearestDepth())) continue;
-    const Eigen::Matrix<double, 2, 6> by_pose = motionJacobian(camera, T, before).topRows<2>();
-    const double weight = 1.0 / (kKernelSquare + (track.now - camera.project(now).head<2>()).squaredNorm());
+    const auto residual = leftResidual(camera, T, before, track.now);
+    if (!residual) continue;
+    const auto& by_pose = residual->by_pose;
+    const double weight = cauchyWeight(residual->value.squaredNorm() / kKernelSquare);
     information += weight * by_pose.transpose() * by_pose;
     product += weight * by_pose.transpose() *
                shiftBy(rates, camera, T.linear(), before, track.before.y(), track.now.y(), by_pose);
@@ -194,15 +193,6 @@ Matrix6d RowReadout::momentOf(const StereoFeatures& features, const MotionHypoth
   const Vector6d by_readout = information.ldlt().solve(product);
   if (!by_readout.allFinite()) return Matrix6d::Zero();
   return squareAround(compensated) * by_readout * by_readout.transpose();
-}
-
-/// Whether the readout is compensated: from its proof on, until it is no longer significant.
-bool RowReadout::isCompensated() const {
-  // Standard deviations (chosen): a global shutter whose rows are off by a pixel reaches 3.8 (Karlsruhe 19, 373 pairs).
-  constexpr double kProof = 5.0;
-  const auto known = estimate();
-  if (!known || !known->isRolling()) return false;
-  return is_compensated_ || (known->sigma < kWarn && std::abs(known->value) > kProof * known->sigma);
 }
 
 }  // namespace sdvo

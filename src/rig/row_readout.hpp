@@ -61,7 +61,6 @@ class RowReadout {
   std::vector<Track> tracksOf(const StereoFeatures& features, const MotionHypothesis& found, std::size_t most) const;
   void measure();
   double squareAround(double compensated) const;
-  bool isCompensated() const;
 
   std::deque<Pair> pairs_;                   ///< the last ones; each continues the one before
   std::vector<cv::Point2f> last_positions_;  ///< of all features of the last pair, px

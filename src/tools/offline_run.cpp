@@ -37,7 +37,7 @@ std::string withoutCommas(std::string text) {
 OfflineRun::OfflineRun(const PipelineOptions& options)
     : extractor_(options.stereo_features), odometry_(options.visual_odometry) {
   const int side = options.stereo_features.patch.layout().side;
-  const std::string complaint = PatchAlignmentOptions().complaint(side);
+  const std::string complaint = alignmentComplaint(side);
   if (!complaint.empty()) throw std::invalid_argument(complaint);
 }
 

@@ -53,7 +53,7 @@ class Weighed : public testing::Test {
 
   LocalMap map_{{}};
   StereoFeatures features_;
-  MotionScene scene_{map_, {}, features_, {}, {}, {}};
+  MotionScene scene_{map_, {}, features_};
 };
 
 TEST_F(Weighed, WhereNothingIsExpectedTheMotionIsAsUncertainAsItIsLong) {

@@ -64,7 +64,7 @@ class Competition : public ::testing::Test {
   MotionHypothesis all_;
   LocalMap map_{LocalMapOptions()};
   StereoFeatures features_ = synthetic::noFeatures(synthetic::camera());
-  MotionScene scene_{map_, {}, features_, {}, {}, {}};
+  MotionScene scene_{map_, {}, features_};
 };
 
 TEST(BayesFactor, IsTheRatioOfTheTwoDensities) {

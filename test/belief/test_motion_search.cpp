@@ -75,7 +75,7 @@ class MotionSearchTest : public ::testing::Test {
 
   MotionScene sceneOf(const StereoFeatures& features, std::optional<double> expected, std::optional<double> prior,
                       bool is_doubted) const {
-    MotionScene scene{map_, calibration_, features, {}, {}, {}};
+    MotionScene scene{map_, calibration_, features};
     scene.all_compete = scene.searches_wide = is_doubted;
     scene.noise = noise_of_rig_;
     if (expected) scene.T_current_reference = Eigen::Isometry3d(Eigen::Translation3d(-*expected, 0.0, 0.0));
@@ -85,11 +85,11 @@ class MotionSearchTest : public ::testing::Test {
   }
 
   void begin(const StereoFeatures& features) {
-    map_.insert({}, features, ++pairs_, Eigen::Isometry3d::Identity(), {}, calibration_);
+    map_.insert(features, ++pairs_, Eigen::Isometry3d::Identity(), {}, calibration_);
   }
 
   void extend(const StereoFeatures& features, const MotionHypothesis& found) {
-    map_.insert({}, features, ++pairs_, found.motion.T_current_reference * map_.newestPose(), found.sightings,
+    map_.insert(features, ++pairs_, found.motion.T_current_reference * map_.newestPose(), found.sightings,
                 calibration_);
   }
 
@@ -112,7 +112,7 @@ class MotionSearchTest : public ::testing::Test {
   LocalMap map_{LocalMapOptions()};
   RigCalibration calibration_;
   Noise noise_of_rig_{NoiseOptions()};
-  MotionSearch search_{{}, {}, {}};
+  MotionSearch search_{MotionEstimatorOptions()};
   const double kLargestDoubt = logOdds(0.05);
   int pairs_ = 0;
 };

@@ -26,10 +26,10 @@ void see(LocalMap& map, const StereoFeatures& features, int id, const Eigen::Iso
       for (int row = 0; row < features.count(); ++row)
         if (std::memcmp(view.points.descriptors.ptr(static_cast<int>(i)), features.descriptors.ptr(row),
                         static_cast<std::size_t>(features.descriptors.cols)) == 0)
-          sightings.push_back(map.sight(PatchAlignmentOptions(), features, T_camera_origin, view.ids[i], row));
+          sightings.push_back(map.sight(features, T_camera_origin, view.ids[i], row));
   }
   sightings.resize(std::min(sightings.size(), most));
-  map.insert({}, features, id, T_camera_origin, sightings, RigCalibration());
+  map.insert(features, id, T_camera_origin, sightings, RigCalibration());
 }
 
 /// The oldest key frame's id after a drive of `pairs` pairs.
@@ -58,7 +58,7 @@ TEST(LocalMapKeyframes, StayWhereTheRigStays) {
 TEST(LocalMap, APairThatSharesHardlyAnythingWithTheOthersIsNotAdjusted) {
   SyntheticScene scene(3, 3000, 120.0);
   LocalMap map{LocalMapOptions()};
-  WindowOptimizer optimizer{WindowOptimizerOptions()};
+  WindowOptimizer optimizer{NoiseOptions()};
   const CalibrationBelief prior = CalibrationFilter(CalibrationOptions()).prior(RigEstimate::Shape::Identity());
   const auto isAdjusted = [&](int id, std::size_t recognised) {
     RigCalibration calibration;
@@ -151,7 +151,7 @@ class Wall {
   /// A map of the wall as seen from 10 m.
   LocalMap mapped(const LocalMapOptions& options = {}) const {
     LocalMap map(options);
-    map.insert({}, view(10.0), 1, poseAt(10.0), {}, RigCalibration());
+    map.insert(view(10.0), 1, poseAt(10.0), {}, RigCalibration());
     return map;
   }
 
@@ -164,7 +164,7 @@ TEST(LocalMapSight, TakesOutTheDetectorsErrorAtAnotherDepth) {
   const Wall wall;
   LocalMap map = wall.mapped();
   const StereoFeatures features = wall.view(8.0, {0.6, -0.5});
-  const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, Wall::poseAt(8.0), 0, 0);
+  const LocalMap::Sighting sighting = map.sight(features, Wall::poseAt(8.0), 0, 0);
   EXPECT_TRUE(sighting.aligned);
   EXPECT_NEAR(sighting.measurement.x(), 320.0, 0.06);
   EXPECT_NEAR(sighting.measurement.y(), 240.0, 0.06);
@@ -196,7 +196,7 @@ TEST(LocalMapSight, KnowsWhatATurnedCameraMakesOfAPatch) {
           Wall::grey(camera.fx * on_wall.x() / on_wall.z(), camera.fy * on_wall.y() / on_wall.z());
     }
   LocalMap map = wall.mapped();
-  const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, turned, 0, 0);
+  const LocalMap::Sighting sighting = map.sight(features, turned, 0, 0);
   ASSERT_TRUE(sighting.aligned);
   EXPECT_NEAR(sighting.measurement.x(), pixel.x(), 0.06);
   EXPECT_NEAR(sighting.measurement.y(), pixel.y(), 0.06);
@@ -208,22 +208,23 @@ TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
   LocalMapOptions map_options;
   map_options.noise.corner = 0.7;
   LocalMap map = wall.mapped(map_options);
-  const auto expectCorner = [&](const PatchAlignmentOptions& options, const StereoFeatures& features, double sigma) {
-    const LocalMap::Sighting sighting = map.sight(options, features, Wall::poseAt(10.0), 0, 0);
+  const auto expectCorner = [&](const StereoFeatures& features, double sigma) {
+    const LocalMap::Sighting sighting = map.sight(features, Wall::poseAt(10.0), 0, 0);
     EXPECT_FALSE(sighting.aligned);
     EXPECT_EQ(sighting.measurement, Eigen::Vector3d(features.u[0], features.v[0], features.disparity[0]));
     EXPECT_EQ(sighting.sigma, sigma);
   };
   StereoFeatures features = wall.view(10.0, {0.6, -0.5});
-  PatchAlignmentOptions off;
-  off.radius = 6;  // samples: too large for a patch of 13
-  expectCorner(off, features, 0.7);
+  StereoFeatures small = features;
+  small.patch_layout.side = 9;
+  small.patches = features.patches.colRange(0, 81).clone();
+  expectCorner(small, 0.7);
   StereoFeatures unlike = features;
   cv::RNG(1).fill(unlike.patches, cv::RNG::UNIFORM, 0, 256);
-  expectCorner(PatchAlignmentOptions(), unlike, map_options.noise.unconfirmedCorner());
+  expectCorner(unlike, map_options.noise.unconfirmedCorner());
   features.patch_layout.side = 0;
   features.patches.release();
-  expectCorner(PatchAlignmentOptions(), features, 0.7);
+  expectCorner(features, 0.7);
 }
 
 TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
@@ -233,8 +234,8 @@ TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
   const auto approach = [&](double distance, const Eigen::Vector2d& error) {
     const StereoFeatures features = wall.view(distance, error);
     const Eigen::Isometry3d pose = Wall::poseAt(distance);
-    const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, pose, 0, 0);
-    map.insert({}, features, ++id, pose, {sighting}, RigCalibration());
+    const LocalMap::Sighting sighting = map.sight(features, pose, 0, 0);
+    map.insert(features, ++id, pose, {sighting}, RigCalibration());
     map.renewAppearance(features, {sighting});
     return sighting;
   };
@@ -276,23 +277,22 @@ StereoFeatures see(const synthetic::World& world, int from, int to, const Eigen:
 
 /// Row `row` of the view's map point as a sighting by row `row_of_pair` of a pair, corners as they are.
 LocalMap::Sighting sighting(const LocalMap& map, const LocalMap::View& view, int row, const StereoFeatures& features,
-                            int row_of_pair, const PatchAlignmentOptions& alignment = {}) {
-  return map.sight(alignment, features, map.newestPose(), view.ids[static_cast<std::size_t>(row)], row_of_pair);
+                            int row_of_pair) {
+  return map.sight(features, map.newestPose(), view.ids[static_cast<std::size_t>(row)], row_of_pair);
 }
 
 /// The pair's rows `from` … recognise the view's rows from 0 on, `count` of them.
-Sightings recognised(const LocalMap& map, const StereoFeatures& features, int count, int from = 0,
-                     const PatchAlignmentOptions& alignment = {}) {
+Sightings recognised(const LocalMap& map, const StereoFeatures& features, int count, int from = 0) {
   const LocalMap::View view = map.view();
   Sightings sightings;
-  for (int k = 0; k < count; ++k) sightings.push_back(sighting(map, view, k, features, from + k, alignment));
+  for (int k = 0; k < count; ++k) sightings.push_back(sighting(map, view, k, features, from + k));
   return sightings;
 }
 
 /// What an odometry does with a pair, without the adjustment.
 void add(LocalMap& map, const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
          const Sightings& sightings, const RigCalibration& calibration = {}) {
-  map.insert({}, features, id, T_camera_origin, sightings, calibration);
+  map.insert(features, id, T_camera_origin, sightings, calibration);
   map.renewAppearance(features, sightings);
 }
 
@@ -341,7 +341,7 @@ TEST(LocalMap, MovesTheNewestPairToWhereItsFeaturesAreNow) {
   const std::vector<Eigen::Vector3d> positions = map.positions(), all = expected.positions();
   ASSERT_EQ(positions.size(), all.size());
   for (std::size_t i = 0; i < all.size(); ++i) EXPECT_LT((positions[i] - all[i]).norm(), 1e-6 * all[i].norm());
-  WindowOptimizer optimizer{WindowOptimizerOptions()};
+  WindowOptimizer optimizer{NoiseOptions()};
   RigCalibration calibration;
   for (LocalMap* each : {&map, &expected}) ASSERT_TRUE(each->adjust(optimizer, {}, calibration).success);
   EXPECT_TRUE(map.newestPose().isApprox(expected.newestPose(), 1e-6));
@@ -586,12 +586,6 @@ TEST(LocalMap, TakesTheAppearanceOfTheLastSighting) {
   }
 }
 
-WindowOptimizer thorough() {
-  WindowOptimizerOptions options;
-  options.iterations = 20;
-  return WindowOptimizer(options);
-}
-
 /// The rig's error is known to be none.
 CalibrationBelief noRigError() {
   return {RigCalibration::Vector::Zero(), 1e12 * RigCalibration::Matrix::Identity()};
@@ -599,7 +593,7 @@ CalibrationBelief noRigError() {
 
 LocalMap::Adjustment adjusted(LocalMap& map) {
   RigCalibration calibration;
-  WindowOptimizer optimizer = thorough();
+  WindowOptimizer optimizer{NoiseOptions()};
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   EXPECT_TRUE(adjustment.success);
   EXPECT_LT(calibration.value.norm(), 1e-6);
@@ -614,36 +608,34 @@ TEST(LocalMap, AdjustmentMovesTheNewestPairToWhereItsPointsSayItIs) {
   const StereoFeatures features = see(world, 0, 60, second);
   Vector6d error;
   error << 0.03, -0.02, 0.04, 0.002, -0.003, 0.004;
-  map.insert({}, features, 2, expSE3(error) * second, recognised(map, features, 60), {});
+  map.insert(features, 2, expSE3(error) * second, recognised(map, features, 60), {});
   EXPECT_TRUE(adjusted(map).rejected.empty());
   EXPECT_LT(logSE3(map.newestPose() * second.inverse()).norm(), 1e-4);
 }
 
 /// A corner that nothing is ever aligned with weighs as much as those seen later, whether it has a patch or not.
 TEST(LocalMap, PatchesThatAreNotAlignedChangeNothing) {
-  PatchAlignmentOptions alignment;
-  alignment.radius = 6;  // samples: too large for a patch of 13
-  const auto poseAfter = [&](bool has_patches, const PatchAlignmentOptions& options) {
+  const auto poseAfter = [&](int patch_side) {
     const synthetic::World world = someWorld(60);
     LocalMap map(everyPairAKeyframe());
     const Eigen::Isometry3d second = translated(0.1, 0.02, -0.5);
     const auto seeNoisily = [&](const Eigen::Isometry3d& pose) {
       StereoFeatures features = see(world, 0, 60, pose);
       for (std::size_t i = 0; i < features.u.size(); ++i) features.u[i] += i % 3 == 0 ? 0.6f : -0.2f;
-      if (has_patches) {
-        features.patch_layout = {13, 1.f, 0.f};
+      if (patch_side > 0) {
+        features.patch_layout = {patch_side, 1.f, 0.f};
         features.patches = cv::Mat::zeros(features.count(), features.patch_layout.bytes(), CV_8U);
       }
       return features;
     };
-    map.insert(options, seeNoisily(kOrigin), 1, kOrigin, {}, RigCalibration());
+    map.insert(seeNoisily(kOrigin), 1, kOrigin, {}, RigCalibration());
     const StereoFeatures features = seeNoisily(second);
-    map.insert(options, features, 2, second, recognised(map, features, 60, 0, options), {});
+    map.insert(features, 2, second, recognised(map, features, 60), {});
     adjusted(map);
     return map.newestPose().matrix();
   };
-  EXPECT_EQ(poseAfter(true, alignment), poseAfter(false, alignment));
-  EXPECT_NE(poseAfter(true, PatchAlignmentOptions()), poseAfter(false, alignment));
+  EXPECT_EQ(poseAfter(9), poseAfter(0)) << "too small to be aligned";
+  EXPECT_NE(poseAfter(13), poseAfter(0));
 }
 
 TEST(LocalMap, APointKeepsItsAppearanceWhenASightingTurnsOutWrong) {
@@ -657,7 +649,7 @@ TEST(LocalMap, APointKeepsItsAppearanceWhenASightingTurnsOutWrong) {
   features.u[17] += 30.f;  // another thing, that looked like point 17
   std::memcpy(features.descriptors.ptr(17), strange.data(), strange.size());
   const Sightings sightings = recognised(map, features, 60);
-  map.insert({}, features, 2, second, sightings, {});
+  map.insert(features, 2, second, sightings, {});
   EXPECT_EQ(adjusted(map).rejected, std::vector<int>{17});
   map.renewAppearance(features, sightings);
 
@@ -676,16 +668,16 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   const Eigen::Isometry3d second = translated(0.2, 0.0, -0.5), third = expSE3(step) * second;
   LocalMapOptions options = everyPairAKeyframe();
   options.noise.corner = 0.05;
-  WindowOptimizerOptions window;
-  window.noise.common_disparity = 0.0;
-  WindowOptimizer optimizer(window);
+  NoiseOptions noise;
+  noise.common_disparity = 0.0;
+  WindowOptimizer optimizer(noise);
   RigCalibration calibration;
   constexpr double kNoise = 0.05;  // px
   const StereoFeatures of_second = see(world, 0, 40, second, kNoise, 2), of_third = see(world, 0, 40, third, kNoise, 3);
 
   LocalMap alone(options);
   add(alone, of_second, 2, second, {});
-  alone.insert({}, of_third, 3, third, recognised(alone, of_third, 40), {});
+  alone.insert(of_third, 3, third, recognised(alone, of_third, 40), {});
   const LocalMap::Adjustment known = alone.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(known.success);
 
@@ -705,7 +697,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   ASSERT_EQ(view.points.count(), 52);
   Sightings sightings;
   for (int i = 0; i < 40; ++i) sightings.push_back(sighting(map, view, 12 + i, of_third, i < 28 ? 12 + i : i - 28));
-  map.insert({}, of_third, 3, third, sightings, {});
+  map.insert(of_third, 3, third, sightings, {});
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(adjustment.success);
   // But for a factor: residuals of loose sightings are smaller than expected.
@@ -723,12 +715,10 @@ TEST(LocalMap, APoseErrsByWhatItsCovarianceSaysAfterManyKeyframesOfTheSamePoints
   constexpr double kNoise = 0.3;  // px
   constexpr int kTrials = 12, kPairs = 24;
   LocalMapOptions options = everyPairAKeyframe();
-  WindowOptimizerOptions window;
-  options.noise.corner = window.noise.corner = kNoise;
-  window.noise.disparity = std::sqrt(2.0) * kNoise;
-  window.noise.common_disparity = 0.0;
-  window.iterations = 20;
-  WindowOptimizer optimizer(window);
+  options.noise.corner = kNoise;
+  options.noise.disparity = std::sqrt(2.0) * kNoise;
+  options.noise.common_disparity = 0.0;
+  WindowOptimizer optimizer(options.noise);
   double nees = 0.0;
   for (unsigned trial = 0; trial < kTrials; ++trial) {
     const synthetic::World world = someWorld(80, trial);

@@ -16,7 +16,6 @@ using synthetic::randomRow;
 std::vector<FeatureMatch> matchWithoutGate(const StereoFeatures& reference, const StereoFeatures& current,
                                            double max_distance = FeatureMatcherOptions().max_distance) {
   FeatureMatcherOptions options;
-  options.gating = false;
   options.max_distance = max_distance;
   return FeatureMatcher(options).match(reference, current, std::nullopt);
 }
@@ -136,23 +135,13 @@ TEST(FeatureMatcher, GateHoldsThePredictedPositionAndNothingFar) {
   }
 }
 
-TEST(FeatureMatcher, AWidenedGateReachesThreeTimesAsFarAndStaysInItsRange) {
-  FeatureMatcherOptions options;
-  options.gate_radius = 12.0;
-  options.max_distance = 0.1;
-  EXPECT_DOUBLE_EQ(options.widened().gate_radius, 36.0);
-  EXPECT_DOUBLE_EQ(options.widened().max_distance, 0.1);
-  options.gate_radius = 1500.0;
-  EXPECT_NO_THROW(FeatureMatcher(options.widened()));
-}
-
 TEST(FeatureMatcher, TakesPredictionsThatLeaveTheImageOrPassTheCamera) {
   const StereoCamera camera = synthetic::camera();
   const synthetic::World world = synthetic::randomWorld(6, 300, {-8.0, -4.0, 2.0}, {8.0, 4.0, 30.0});
   const StereoFeatures features = synthetic::observe(world, camera, Eigen::Isometry3d::Identity(), 1);
   for (const double forward : {-60.0, -4.0, 1e6}) {
     const Eigen::Isometry3d T(Eigen::Translation3d(1e3 * (forward > 0.0), 0.0, forward));
-    EXPECT_LE(FeatureMatcher({}).match(features, features, T).size(), static_cast<std::size_t>(features.count()));
+    EXPECT_LE(FeatureMatcher().match(features, features, T).size(), static_cast<std::size_t>(features.count()));
   }
 }
 
@@ -169,8 +158,8 @@ TEST(FeatureMatcher, DoesNotLookForWhatIsBehindTheCamera) {
   const Eigen::Vector3d mirrored = camera.project(passed * point);
   StereoFeatures current = noFeatures(camera);
   addFeature(current, mirrored.x(), mirrored.y(), 10.0, row);
-  EXPECT_TRUE(FeatureMatcher({}).match(reference, current, passed).empty());
-  EXPECT_EQ(FeatureMatcher({}).match(reference, current, std::nullopt).size(), 1u);
+  EXPECT_TRUE(FeatureMatcher().match(reference, current, passed).empty());
+  EXPECT_EQ(FeatureMatcher().match(reference, current, std::nullopt).size(), 1u);
 }
 
 /// Descriptors of numbers: {a few of them}, written as the type's bytes.
@@ -224,7 +213,7 @@ TEST(FeatureMatcher, RefusesSetsThatCannotBeCompared) {
   addFeature(both, 100, 100, 10, randomRow(random, 128));
   addFeature(left, 100, 100, 10, randomRow(random, 64));
   left.layout = DescriptorLayout::kLeft;
-  expectRefusals(both, [&](const StereoFeatures& other) { FeatureMatcher({}).match(both, other, std::nullopt); },
+  expectRefusals(both, [&](const StereoFeatures& other) { FeatureMatcher().match(both, other, std::nullopt); },
                  {{[&](StereoFeatures& other) { other = left; }, "left+right"},
                   {[](StereoFeatures& other) { other.descriptor = "orb"; }, "orb"},
                   {[](StereoFeatures& other) { other.element_type = ElementType::kUint8; }, ""}});
@@ -249,7 +238,7 @@ TEST(FeatureMatcher, TakesEmptySets) {
   const StereoFeatures none = noFeatures(synthetic::camera());
   StereoFeatures one = none;
   addFeature(one, 100, 100, 10, randomRow(random, 128));
-  const FeatureMatcher matcher({});
+  const FeatureMatcher matcher;
   EXPECT_TRUE(matcher.match(none, one, std::nullopt).empty());
   EXPECT_TRUE(matcher.match(one, none, std::nullopt).empty());
   EXPECT_TRUE(matcher.match(none, none, Eigen::Isometry3d::Identity()).empty());

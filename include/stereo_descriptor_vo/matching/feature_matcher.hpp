@@ -2,12 +2,10 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 namespace sdvo {
@@ -29,23 +27,11 @@ struct DescribedPoints {
 };
 
 struct FeatureMatcherOptions {
-  bool gating = true;  ///< compare only near the position that the predicted motion gives
-  double gate_radius = 20.0;
-  double max_distance = 0.3;
+  double gate_radius = 20.0;  ///< px, of the search around a predicted left position
+  double max_distance = 0.3;  ///< see FeatureMatch::distance
 
-  static constexpr double kWidestGate = 2000.0;  ///< px
   /// For a prediction that may be wrong.
-  FeatureMatcherOptions widened() const {
-    FeatureMatcherOptions wide = *this;
-    wide.gate_radius = std::min(3.0 * gate_radius, kWidestGate);
-    return wide;
-  }
-
-  void describe(OptionList& list) {
-    list.add("gate_radius", gate_radius, {1.0, kWidestGate}, "px",
-             "radius of that search around the predicted left position; three times as far where that finds no certain "
-             "motion, or one that leads out of it");
-  }
+  static FeatureMatcherOptions wide() { return {60.0}; }
 };
 
 /// A correspondence between described points, of another pair or of a map, and the features of a pair.
@@ -58,12 +44,12 @@ struct FeatureMatch {
 /// Mutual nearest neighbours between the descriptors of two camera positions.
 class FeatureMatcher {
  public:
-  explicit FeatureMatcher(const FeatureMatcherOptions& options);
+  explicit FeatureMatcher(const FeatureMatcherOptions& options = {}) : options_(options) {}
 
   const FeatureMatcherOptions& options() const { return options_; }
 
-  /// Matches in the order of the reference's points. With a prediction of the motion and gating on, only features near
-  /// their predicted position are compared. Throws std::invalid_argument when the descriptors are of different kinds.
+  /// Matches in the order of the reference's points. With a prediction of the motion, only features near their
+  /// predicted position are compared. Throws std::invalid_argument when the descriptors are of different kinds.
   std::vector<FeatureMatch> match(const DescribedPoints& reference, const StereoFeatures& current,
                                   const std::optional<Eigen::Isometry3d>& T_current_reference) const;
 

@@ -285,7 +285,7 @@ class VisualOdometryNodelet : public RobotNodelet {
   OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message, const Guess& guess) {
     if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
     processed_epoch_ = message.stream_epoch;
-    const std::string complaint = PatchAlignmentOptions().complaint(features.patch_layout.side);
+    const std::string complaint = alignmentComplaint(features.patch_layout.side);
     if (!complaint.empty()) SDVO_WARN("patches", complaint);
     odometry_->mountAt(*mount_->last());
     const bool has_jumped = !processed_ || !guess.since || guess.since->stamp != processed_->stamp;
