@@ -83,12 +83,42 @@ inline cv::Mat render(cv::Size size, const Texture& texture, double left = 0.0, 
   return render(size, [&](double u, double v) { return texture.at(u + left, v - down); });
 }
 
+/// Grey levels without any order.
+inline cv::Mat noise(cv::Size size, unsigned seed) {
+  cv::Mat image(size, CV_8U);
+  cv::RNG(seed).fill(image, cv::RNG::UNIFORM, 0, 256);
+  return image;
+}
+
+/// Mean grey level of a square, pixel by pixel: pixel p covers [p - 0.5, p + 0.5].
+inline double meanByArea(const cv::Mat& image, double u, double v, double half_side) {
+  const auto overlap = [&](int pixel, double centre) {
+    return std::max(0.0, std::min(pixel + 0.5, centre + half_side) - std::max(pixel - 0.5, centre - half_side));
+  };
+  double sum = 0.0;
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) sum += overlap(x, u) * overlap(y, v) * image.at<std::uint8_t>(y, x);
+  return sum / (4.0 * half_side * half_side);
+}
+
 /// View of the fronto-parallel plane at `depth` m that carries `texture` (in m) from a camera whose centre is `x` m to
 /// the right of the texture's origin.
 inline cv::Mat renderPlane(const Texture& texture, const StereoCamera& camera, double depth, double x = 0.0) {
   return render({camera.width, camera.height}, [&](double u, double v) {
     return texture.at((u - camera.cx) * depth / camera.fx + x, (v - camera.cy) * depth / camera.fy);
   });
+}
+
+/// The images of both cameras.
+struct Views {
+  cv::Mat left, right;
+};
+
+/// A textured plane at `depth` m across the optical axis; wavelengths from 6 px on.
+inline Views planeAt(double depth, unsigned seed = 31) {
+  const double metres_per_pixel = depth / camera().fx;
+  const Texture texture(seed, 6.0 * metres_per_pixel, 96.0 * metres_per_pixel);
+  return {renderPlane(texture, camera(), depth), renderPlane(texture, camera(), depth, camera().baseline)};
 }
 
 /// A row of random bits.

@@ -184,12 +184,6 @@ TEST(SiftDescriptor, SamplesTheOctaveAndLayerOfTheSizeAndItsRowsAreWholeNumbers)
   }
 }
 
-TEST(SiftDescriptor, IsMostAlikeAtTheSizeOfTheDistance) {
-  const auto sift = makeBaseDescriptor(DescriptorType::kSift);
-  const double at_size = twoDistances().meanDistance(*sift, 2.0);
-  for (const double ratio : {1.0, 1.4, 2.8})
-    EXPECT_LT(at_size, twoDistances().meanDistance(*sift, ratio)) << "ratio " << ratio;
-}
 #endif
 
 }  // namespace sdvo::test_base_descriptor

@@ -6,12 +6,12 @@
 
 #include "../../src/front_end/block_differences.hpp"
 #include "../kernels.hpp"
+#include "../synthetic_scene.hpp"
 
 namespace sdvo::test_block_differences {
 
 cv::Mat noise(unsigned seed, bool extreme) {
-  cv::Mat image(40, 131, CV_8U);
-  cv::RNG(seed).fill(image, cv::RNG::UNIFORM, 0, 256);
+  const cv::Mat image = synthetic::noise({131, 40}, seed);
   return extreme ? cv::Mat(image > 100) : image;
 }
 

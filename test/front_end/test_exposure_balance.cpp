@@ -6,25 +6,14 @@
 
 namespace sdvo::test_exposure_balance {
 
-struct Pair {
-  cv::Mat left, right;
-
+struct Pair : synthetic::Views {
   void balance() { balanceExposures(cv::mean(left)[0], cv::mean(right)[0], left, right); }
 };
 
-/// A textured plane 10 m ahead.
-Pair wall() {
-  const StereoCamera camera = synthetic::camera();
-  const double metres_per_pixel = 10.0 / camera.fx;
-  const synthetic::Texture texture(3, 6.0 * metres_per_pixel, 96.0 * metres_per_pixel);
-  return {synthetic::renderPlane(texture, camera, 10.0),
-          synthetic::renderPlane(texture, camera, 10.0, camera.baseline)};
-}
-
-/// The wall; the right image is another exposure of it.
+/// A textured plane 10 m ahead; the right image is another exposure of it.
 Pair exposed(double gain, double offset = 0.0) {
-  static const Pair equal = wall();
-  Pair pair{equal.left, {}};
+  static const synthetic::Views equal = synthetic::planeAt(10.0, 3);
+  Pair pair{{equal.left, {}}};
   equal.right.convertTo(pair.right, CV_8U, gain, offset);
   return pair;
 }
@@ -46,7 +35,7 @@ TEST(ExposureBalance, ALevelBecomesTheOneThatItWasMadeOf) {
   for (int y = 0; y < left.rows; ++y)
     for (int x = 0; x < left.cols; ++x) left.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(x);
   left.convertTo(right, CV_8U, 0.5, 10.0);
-  Pair pair{left, right};
+  Pair pair{{left, right}};
   pair.balance();
   EXPECT_EQ(pair.left.data, left.data);
   EXPECT_LE(cv::norm(pair.right, left, cv::NORM_INF), 1.0);

@@ -14,23 +14,19 @@ namespace test_fast_corners {
 void expectCornersOfOpenCv(const cv::Mat& image, int threshold) {
   std::vector<cv::KeyPoint> expected;
   cv::FAST(image, expected, threshold, true);
-  const std::vector<cv::KeyPoint> found = findFastCorners(image, threshold);
-  ASSERT_EQ(found.size(), expected.size()) << image.size() << ", threshold " << threshold;
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    ASSERT_EQ(found[i].pt, expected[i].pt) << image.size() << ", threshold " << threshold;
-    ASSERT_EQ(found[i].response, expected[i].response) << found[i].pt << ", threshold " << threshold;
-  }
-}
-
-cv::Mat noise(cv::Size size, unsigned seed) {
-  cv::Mat image(size, CV_8U);
-  cv::RNG(seed).fill(image, cv::RNG::UNIFORM, 0, 256);
-  return image;
+  withEveryKernel([&] {
+    const std::vector<cv::KeyPoint> found = findFastCorners(image, threshold);
+    ASSERT_EQ(found.size(), expected.size()) << image.size() << ", threshold " << threshold;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      ASSERT_EQ(found[i].pt, expected[i].pt) << image.size() << ", threshold " << threshold;
+      ASSERT_EQ(found[i].response, expected[i].response) << found[i].pt << ", threshold " << threshold;
+    }
+  });
 }
 
 TEST(FastCorners, AreThoseOfOpenCv) {
   for (const int threshold : {1, 12, 40, 100}) {
-    const cv::Mat image = noise({317, 113}, 3);
+    const cv::Mat image = synthetic::noise({317, 113}, 3);
     expectCornersOfOpenCv(image, threshold);
     cv::Mat smooth;
     cv::GaussianBlur(image, smooth, {}, 1.5);
@@ -42,18 +38,14 @@ TEST(FastCorners, AreThoseOfOpenCv) {
 
 TEST(FastCorners, AreThoseOfOpenCvInImagesOfAnySize) {
   for (int width = 1; width <= 110; ++width)
-    expectCornersOfOpenCv(noise({width, 23}, static_cast<unsigned>(width)), 10);
+    expectCornersOfOpenCv(synthetic::noise({width, 23}, static_cast<unsigned>(width)), 10);
   for (int height = 1; height <= 12; ++height)
-    expectCornersOfOpenCv(noise({70, height}, static_cast<unsigned>(height)), 10);
+    expectCornersOfOpenCv(synthetic::noise({70, height}, static_cast<unsigned>(height)), 10);
 }
 
 TEST(FastCorners, AreThoseOfOpenCvInPartsOfImages) {
-  const cv::Mat image = noise({200, 90}, 5);
+  const cv::Mat image = synthetic::noise({200, 90}, 5);
   expectCornersOfOpenCv(image(cv::Rect(13, 7, 101, 61)), 20);
-}
-
-TEST(FastCorners, AreTheSameWithoutVectors) {
-  withEveryKernel([] { expectCornersOfOpenCv(noise({150, 80}, 7), 20); });
 }
 
 }  // namespace test_fast_corners
@@ -61,9 +53,8 @@ TEST(FastCorners, AreTheSameWithoutVectors) {
 namespace test_corner_peak {
 
 /// Blurred noise.
-cv::Mat texture(cv::Size size, int seed) {
-  cv::Mat image(size, CV_8U);
-  cv::RNG(static_cast<std::uint64_t>(seed)).fill(image, cv::RNG::UNIFORM, 0, 256);
+cv::Mat texture(cv::Size size, unsigned seed) {
+  cv::Mat image = synthetic::noise(size, seed);
   cv::GaussianBlur(image, image, {}, 1.2);
   return image;
 }
@@ -113,43 +104,6 @@ TEST(CornerPeak, SpotsAreBrightOrDark) {
     EXPECT_NEAR(peak.x, 0.3, 0.05) << height;
     EXPECT_NEAR(peak.y, -0.2, 0.05) << height;
   }
-}
-
-/// The same corners in two noisy images that are a part of a pixel apart: how far their positions are from that.
-TEST(CornerPeak, IsMoreRepeatableThanGradientLinesAre) {
-  const cv::Point2f move(0.4f, -0.3f);
-  const cv::Mat one = texture({400, 300}, 7);
-  cv::Mat other;
-  cv::warpAffine(one, other, cv::Matx23f(1.f, 0.f, move.x, 0.f, 1.f, move.y), one.size(), cv::INTER_CUBIC);
-  std::vector<cv::KeyPoint> corners[2];
-  std::vector<cv::Point2f> peaks[2], crossings[2];
-  for (const int i : {0, 1}) {
-    cv::Mat noisy, noise(one.size(), CV_16S);
-    cv::RNG(static_cast<std::uint64_t>(11 + i)).fill(noise, cv::RNG::NORMAL, 0, 2);
-    cv::add(i == 0 ? one : other, noise, noisy, cv::noArray(), CV_8U);
-    cv::FAST(noisy, corners[i], 12, true);
-    for (const cv::KeyPoint& corner : corners[i]) {
-      crossings[i].push_back(corner.pt);
-      peaks[i].push_back(corner.pt + cornerPeak(noisy, corner.pt));
-    }
-    const cv::TermCriteria until{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 10, 0.02};
-    cv::cornerSubPix(noisy, crossings[i], {3, 3}, {-1, -1}, until);
-  }
-  double pixels = 0.0, of_peaks = 0.0, of_crossings = 0.0;
-  int pairs = 0;
-  for (std::size_t i = 0; i < corners[0].size(); ++i)
-    for (std::size_t j = 0; j < corners[1].size(); ++j) {
-      const cv::Point2f apart = corners[0][i].pt + move - corners[1][j].pt;
-      if (cv::norm(apart) > 1.2) continue;
-      ++pairs;
-      const auto square = [](const cv::Point2f& p) { return std::min(p.dot(p), 2.25f); };  // of what was lost
-      pixels += square(apart);
-      of_peaks += square(peaks[0][i] + move - peaks[1][j]);
-      of_crossings += square(crossings[0][i] + move - crossings[1][j]);
-    }
-  ASSERT_GT(pairs, 300);
-  EXPECT_LT(std::sqrt(of_peaks), 0.7 * std::sqrt(pixels));
-  EXPECT_LT(std::sqrt(of_peaks), 0.7 * std::sqrt(of_crossings));
 }
 
 TEST(CornerPeak, IsThePixelItselfWhereThereIsNoMaximum) {

@@ -8,18 +8,8 @@
 
 namespace sdvo::test_feature_extractor {
 
-struct Pair {
-  cv::Mat left, right;
-};
-
-/// A textured plane across the optical axis; wavelengths from 6 px on.
-Pair planeAt(double depth, unsigned seed = 31) {
-  const StereoCamera camera = synthetic::camera();
-  const double metres_per_pixel = depth / camera.fx;
-  const synthetic::Texture texture(seed, 6.0 * metres_per_pixel, 96.0 * metres_per_pixel);
-  return {synthetic::renderPlane(texture, camera, depth),
-          synthetic::renderPlane(texture, camera, depth, camera.baseline)};
-}
+using synthetic::planeAt;
+using synthetic::Views;
 
 FeatureExtractorOptions fewFeatures() {
   FeatureExtractorOptions options;
@@ -27,8 +17,8 @@ FeatureExtractorOptions fewFeatures() {
   return options;
 }
 
-StereoFeatures extract(const Pair& pair, const FeatureExtractorOptions& options = fewFeatures(), std::int64_t stamp = 0,
-                       const StereoCamera& camera = synthetic::camera()) {
+StereoFeatures extract(const Views& pair, const FeatureExtractorOptions& options = fewFeatures(),
+                       std::int64_t stamp = 0, const StereoCamera& camera = synthetic::camera()) {
   return FeatureExtractor(options).extract(camera, pair.left, pair.right, stamp);
 }
 
@@ -192,7 +182,7 @@ TEST(FeatureExtractor, RefusesWrongImagesNamingTheSide) {
 TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   const StereoCamera camera = synthetic::camera();
   const cv::Mat black(camera.height, camera.width, CV_8U, cv::Scalar(0));
-  const Pair pair = planeAt(10.0);
+  const Views pair = planeAt(10.0);
   FeatureExtractorOptions huge = fewFeatures();
   huge.size_curve.min_size = huge.size_curve.max_size = 150.0;  // reaches 471 px
   huge.descriptor.extend_border = false;
@@ -218,7 +208,7 @@ TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
 TEST(FeatureExtractor, NamesTheSideThatShowsNothingOrRepeats) {
   const FeatureExtractor extractor(fewFeatures());
   const StereoCamera camera = synthetic::camera();
-  const Pair pair = planeAt(10.0), next = planeAt(10.0, 32);
+  const Views pair = planeAt(10.0), next = planeAt(10.0, 32);
   cv::Mat plate(pair.left.size(), CV_8U), blurred;
   cv::randn(plate, 110.0, 2.0);
   cv::GaussianBlur(next.right, blurred, {}, 15.0);
@@ -241,7 +231,7 @@ TEST(FeatureExtractor, NamesTheSideThatShowsNothingOrRepeats) {
 }
 
 TEST(FeatureExtractor, SizesFollowTheDescriptorUnlessSet) {
-  const Pair pair = planeAt(8.0);
+  const Views pair = planeAt(8.0);
   for (const DescriptorType type : {DescriptorType::kFreak, DescriptorType::kBrief, DescriptorType::kOrb}) {
     FeatureExtractorOptions options = fewFeatures();
     options.descriptor.type = type;
@@ -270,7 +260,7 @@ TEST(FeatureExtractor, DescribesMostOfASmallImage) {
   StereoCamera small = synthetic::camera();
   small.width = 424, small.height = 240;
   small.cx -= 100.0, small.cy -= 100.0;
-  const Pair pair = planeAt(5.0);
+  const Views pair = planeAt(5.0);
   const cv::Range rows(100, 340), columns(100, 524);
   const StereoFeatures features = extract({pair.left(rows, columns), pair.right(rows, columns)}, {}, 0, small);
   ASSERT_GT(features.report.stereo_matched, 100);
@@ -283,7 +273,7 @@ TEST(FeatureExtractor, SizeCurveIsThatOfEverySizeAlsoInALowImage) {
   StereoCamera low = synthetic::camera();
   low.height = 150;
   low.cy -= 100.0;
-  const Pair pair = planeAt(5.0);
+  const Views pair = planeAt(5.0);
   const cv::Range rows(100, 250);
   const FeatureExtractor extractor{FeatureExtractorOptions()};
   const StereoFeatures features = extractor.extract(low, pair.left.rowRange(rows), pair.right.rowRange(rows), 0);
@@ -300,7 +290,7 @@ TEST(FeatureExtractor, SizeCurveIsThatOfEverySizeAlsoInALowImage) {
 TEST(FeatureExtractor, IsStateless) {
   const StereoCamera camera = synthetic::camera();
   const FeatureExtractor extractor(fewFeatures());
-  const Pair first = planeAt(8.0), second = planeAt(12.0, 32);
+  const Views first = planeAt(8.0), second = planeAt(12.0, 32);
   const StereoFeatures before = extractor.extract(camera, first.left, first.right, 1);
   EXPECT_NE(before.u, extractor.extract(camera, second.left, second.right, 2).u);
   synthetic::expectEqual(before, extractor.extract(camera, first.left, first.right, 3));
@@ -308,7 +298,7 @@ TEST(FeatureExtractor, IsStateless) {
 }
 
 TEST(FeatureExtractor, LeavesItsImagesAlone) {
-  const Pair pair = planeAt(8.0);
+  const Views pair = planeAt(8.0);
   const cv::Mat left = pair.left.clone(), right = pair.right.clone();
   extract(pair);
   EXPECT_TRUE(synthetic::equalMats(pair.left, left));

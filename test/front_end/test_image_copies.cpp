@@ -3,6 +3,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "../../src/front_end/image_copies.hpp"
+#include "../synthetic_scene.hpp"
 
 namespace sdvo {
 
@@ -17,8 +18,8 @@ constexpr double kRounding = 0.0;
 #endif
 
 void expectHalfOfOpenCv(cv::Size size) {
-  cv::Mat image(size, CV_8U), expected, half;
-  cv::RNG(static_cast<unsigned>(size.area())).fill(image, cv::RNG::UNIFORM, 0, 256);
+  const cv::Mat image = synthetic::noise(size, static_cast<unsigned>(size.area()));
+  cv::Mat expected, half;
   cv::resize(image, expected, cv::Size((size.width + 1) / 2, (size.height + 1) / 2), 0.0, 0.0, cv::INTER_AREA);
   halveImage(image, half);
   ASSERT_EQ(half.size(), expected.size());
@@ -35,8 +36,7 @@ TEST(HalfImage, IsThatOfOpenCv) {
 namespace test_image_margin {
 
 TEST(ImageMargin, IsTheReplicatedBorderOfOpenCv) {
-  cv::Mat whole(40, 60, CV_8U);
-  cv::RNG(7).fill(whole, cv::RNG::UNIFORM, 0, 256);
+  const cv::Mat whole = synthetic::noise({60, 40}, 7);
   cv::Mat larger;
   for (const cv::Rect part : {cv::Rect(0, 0, 60, 40), cv::Rect(3, 5, 41, 17), cv::Rect(9, 9, 1, 1)})
     for (const int margin : {0, 1, 17, 64}) {

@@ -7,12 +7,6 @@ namespace sdvo::test_integral_image {
 /// Three columns, two rows; pixel (u, v) covers [u - 0.5, u + 0.5] x [v - 0.5, v + 0.5].
 const cv::Mat kSmall = (cv::Mat_<std::uint8_t>(2, 3) << 10, 20, 40, 80, 160, 240);
 
-TEST(IntegralImage, ABoxOfOnePixelIsThatPixel) {
-  const IntegralImage image(kSmall);
-  for (int v = 0; v < 2; ++v)
-    for (int u = 0; u < 3; ++u) EXPECT_EQ(image.boxMean(u, v, 0.5), kSmall.at<std::uint8_t>(v, u)) << u << ", " << v;
-}
-
 TEST(IntegralImage, BoxesBetweenPixelsWeighByArea) {
   const IntegralImage image(kSmall);
   EXPECT_EQ(image.boxMean(0.5, 0.5, 1.0), (10 + 20 + 80 + 160) / 4.f);

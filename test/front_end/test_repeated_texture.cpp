@@ -6,11 +6,9 @@
 
 namespace sdvo::test_repeated_texture {
 
-const cv::Size kSize(640, 400);
+using synthetic::Views;
 
-struct Pair {
-  cv::Mat left, right;
-};
+const cv::Size kSize(640, 400);
 
 /// Points of the left image, at positions between pixels.
 std::vector<cv::Point2f> grid() {
@@ -23,13 +21,13 @@ std::vector<cv::Point2f> grid() {
 constexpr double kPeriod = 93.7, kNearDisparity = 6.6;  // px
 
 /// A wall of equal bays, sampled without a lens' blur, with noise; `dirt` is added to it at (u, v) of the left image.
-Pair bays(const std::function<double(double u, double v)>& dirt = [](double, double) { return 0.0; }) {
+Views bays(const std::function<double(double u, double v)>& dirt = [](double, double) { return 0.0; }) {
   const synthetic::Texture texture(41, 2.2, 40.0);
   const auto grey = [&](double u, double v) {
     return texture.at(u - kPeriod * std::floor(u / kPeriod), v) + dirt(u, v);
   };
-  Pair pair{synthetic::render(kSize, grey),
-            synthetic::render(kSize, [&](double u, double v) { return grey(u + kNearDisparity, v); })};
+  Views pair{synthetic::render(kSize, grey),
+             synthetic::render(kSize, [&](double u, double v) { return grey(u + kNearDisparity, v); })};
   cv::RNG random(3);
   for (cv::Mat* view : {&pair.left, &pair.right}) {
     cv::Mat noise(kSize, CV_16S);
@@ -43,7 +41,7 @@ Pair bays(const std::function<double(double u, double v)>& dirt = [](double, dou
 struct Counts {
   int right = 0, wrong = 0, ambiguous = 0;
 };
-Counts countBays(const Pair& pair, double max_disparity = 192.0) {
+Counts countBays(const Views& pair, double max_disparity = 192.0) {
   StereoMatcherOptions options;
   options.epipolar.max_disparity = max_disparity;
   Counts counts;
@@ -55,7 +53,7 @@ Counts countBays(const Pair& pair, double max_disparity = 192.0) {
 }
 
 TEST(RepeatedTexture, TextureThatRepeatsAlongTheRowIsAmbiguous) {
-  const Pair pair = bays();
+  const Views pair = bays();
   const Counts counts = countBays(pair);
   EXPECT_LE(counts.wrong, 2);
   EXPECT_GT(counts.ambiguous, 200);

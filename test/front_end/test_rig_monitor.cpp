@@ -55,10 +55,49 @@ TEST(RigMonitor, LooksOnlyWhenFewCornersAreFound) {
   EXPECT_FALSE(RigMonitor(off, 1.5, 192.0).isSuspicious(1000, 0));
 }
 
-TEST(RigMonitor, SaysNothingOfARigInOrder) {
-  EXPECT_EQ(diagnosis(leftImage(), rightImage(0.0)), "");
-  EXPECT_EQ(diagnosis(leftImage(), rightImage(1.0)), "") << "less than the matcher takes";
-  EXPECT_EQ(diagnosis(leftImage(), rightImage(0.0, 0.0, 0.5)), "") << "gain is no fault of the rig";
+TEST(RigMonitor, SaysNothingOfARigInOrderOrWhereNothingIsFound) {
+  const cv::Mat left = leftImage(), dark(kSize, CV_8U, cv::Scalar(3));
+  EXPECT_EQ(diagnosis(left, rightImage(0.0)), "");
+  EXPECT_EQ(diagnosis(left, rightImage(1.0)), "") << "less than the matcher takes";
+  EXPECT_EQ(diagnosis(left, rightImage(0.0, 0.0, 0.5)), "") << "gain is no fault of the rig";
+  EXPECT_EQ(diagnosis(left, dark), "");
+  EXPECT_EQ(diagnosis(dark, dark), "");
+  EXPECT_EQ(diagnosis(left, synthetic::render(kSize, synthetic::Texture(99, 5.0, 160.0))), "");
+  EXPECT_EQ(RigMonitor({}, 1.5, 192.0).diagnose(left, rightImage(4.0), {}).words, "");
+}
+
+TEST(RigMonitor, NamesWhatIsWrong) {
+  constexpr double kDegree = CV_PI / 180.0;
+  const cv::Mat left = leftImage(), right = rightImage(0.0);
+  const std::string swapped = "are swapped, both are mirrored, or";
+  const std::string left_mirrored = "left image is mirrored, or the right one is and both are swapped";
+  const std::string right_mirrored = "right image is mirrored, or the left one is and both are swapped";
+  // Waves of 6 px, as no offset and no rotation makes them.
+  const cv::Mat wavy = synthetic::render(
+      kSize, [](double u, double v) { return texture().at(u + kDisparity, v - 6.0 * std::sin(u / 40.0)); });
+  struct Fault {
+    cv::Mat left, right;
+    std::string words;
+  };
+  for (const Fault& fault : {
+           Fault{left, rightImage(4.0), "right image 4.0 px too low: not rectified?"},
+           Fault{left, rightImage(-5.0), "right image 5.0 px too high: not rectified?"},
+           Fault{left, rightImage(4.0, 0.0, 0.5), "right image 4.0 px too low"},
+           Fault{left, rightImage(0.0, 2.0 * kDegree), "turned by 2.0 degrees clockwise"},
+           Fault{left, rightImage(0.0, -3.0 * kDegree), "turned by 3.0 degrees counterclockwise"},
+           Fault{left, wavy, "px here and there"},
+           Fault{right, left, swapped},
+           Fault{flipped(left, 1), flipped(right, 1), swapped},
+           Fault{flipped(left, 1), right, left_mirrored},
+           Fault{left, flipped(right, 1), right_mirrored},
+           Fault{flipped(right, 1), left, right_mirrored},
+           Fault{flipped(left, -1), right, "the left image is upside down"},
+           Fault{left, flipped(right, -1), "the right image is upside down"},
+           // A twentieth of the light, rounded to whole levels.
+           Fault{0.05 * right, 0.05 * left, "are swapped, both are mirrored"},
+           Fault{0.05 * left, 0.05 * rightImage(4.0), "px too low"},
+       })
+    expectWords(diagnosis(fault.left, fault.right), {fault.words});
 }
 
 // It takes milliseconds, and a view with little to match is suspicious pair after pair.
@@ -83,36 +122,6 @@ TEST(RigMonitor, LooksNoFurtherOnceAFewCornersClearIt) {
   EXPECT_NE(diagnose([](std::size_t i) { return i % 6 == 0; }), "") << "there is a doubt from the beginning";
 }
 
-TEST(RigMonitor, NamesTheHeightOfTheRightImage) {
-  expectWords(diagnosis(leftImage(), rightImage(4.0)), {"right image 4.0 px too low: not rectified?"});
-  expectWords(diagnosis(leftImage(), rightImage(-5.0)), {"right image 5.0 px too high: not rectified?"});
-  expectWords(diagnosis(leftImage(), rightImage(4.0, 0.0, 0.5)), {"right image 4.0 px too low"});
-}
-
-TEST(RigMonitor, NamesARotation) {
-  expectWords(diagnosis(leftImage(), rightImage(0.0, 2.0 * CV_PI / 180.0)), {"turned by 2.0 degrees clockwise"});
-  expectWords(diagnosis(leftImage(), rightImage(0.0, -3.0 * CV_PI / 180.0)),
-              {"turned by 3.0 degrees counterclockwise"});
-}
-
-TEST(RigMonitor, NamesSidesThatAreSwappedOrFlipped) {
-  const cv::Mat left = leftImage(), right = rightImage(0.0);
-  const std::string swapped = "are swapped, both are mirrored, or";
-  expectWords(diagnosis(right, left), {swapped});
-  expectWords(diagnosis(flipped(left, 1), flipped(right, 1)), {swapped});
-  struct OneSide {
-    int code;
-    std::string of_left, of_right;
-  };
-  for (const OneSide& flip : {OneSide{1, "left image is mirrored, or the right one is and both are swapped",
-                                      "right image is mirrored, or the left one is and both are swapped"},
-                              OneSide{-1, "the left image is upside down", "the right image is upside down"}}) {
-    expectWords(diagnosis(flipped(left, flip.code), right), {flip.of_left});
-    expectWords(diagnosis(left, flipped(right, flip.code)), {flip.of_right});
-  }
-  expectWords(diagnosis(flipped(right, 1), left), {"right image is mirrored, or the left one is and both are swapped"});
-}
-
 /// A robot before a wall: few corners are in both views, and a wrong one far from them shows no slope of the rows.
 TEST(RigMonitor, NamesAWallThatIsTooNear) {
   const RigMonitor monitor({}, 1.5, 192.0);
@@ -124,27 +133,6 @@ TEST(RigMonitor, NamesAWallThatIsTooNear) {
     EXPECT_FALSE(diagnosis.refused) << share << diagnosis.words;
     EXPECT_EQ(contains(diagnosis.words, "too near"), share > 0.5) << share << diagnosis.words;
   }
-}
-
-/// A twentieth of the light, rounded to whole levels.
-TEST(RigMonitor, NamesThemInTheDark) {
-  expectWords(diagnosis(0.05 * rightImage(0.0), 0.05 * leftImage()), {"are swapped, both are mirrored"});
-  expectWords(diagnosis(0.05 * leftImage(), 0.05 * rightImage(4.0)), {"px too low"});
-}
-
-TEST(RigMonitor, NamesRowsThatDiffer) {
-  // Waves of 6 px, as no offset and no rotation makes them.
-  const cv::Mat wavy = synthetic::render(
-      kSize, [](double u, double v) { return texture().at(u + kDisparity, v - 6.0 * std::sin(u / 40.0)); });
-  expectWords(diagnosis(leftImage(), wavy), {"px here and there"});
-}
-
-TEST(RigMonitor, SaysNothingWhereNothingIsFound) {
-  const cv::Mat dark(kSize, CV_8U, cv::Scalar(3));
-  EXPECT_EQ(diagnosis(leftImage(), dark), "");
-  EXPECT_EQ(diagnosis(dark, dark), "");
-  EXPECT_EQ(diagnosis(leftImage(), synthetic::render(kSize, synthetic::Texture(99, 5.0, 160.0))), "");
-  EXPECT_EQ(RigMonitor({}, 1.5, 192.0).diagnose(leftImage(), rightImage(4.0), {}).words, "");
 }
 
 }  // namespace sdvo::test_rig_monitor

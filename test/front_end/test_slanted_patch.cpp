@@ -6,19 +6,13 @@
 
 #include "../../src/front_end/slanted_patch.hpp"
 #include "../kernels.hpp"
+#include "../synthetic_scene.hpp"
 
 namespace sdvo {
 
 namespace test_patch_sampling {
 
 constexpr int kMargin = 16, kWidth = 30, kHeight = 20;
-
-/// Grey levels without any order, over a picture of kWidth x kHeight and its margin.
-cv::Mat noise() {
-  cv::Mat image(kHeight + 2 * kMargin, kWidth + 2 * kMargin, CV_8U);
-  cv::RNG(3).fill(image, cv::RNG::UNIFORM, 0.0, 256.0);
-  return image;
-}
 
 /// Bilinear interpolation between the four pixels around a position of the picture.
 double interpolated(const cv::Mat& image, double x, double y) {
@@ -34,7 +28,7 @@ double interpolated(const cv::Mat& image, double x, double y) {
 /// Rows go on beyond the square.
 void expectSampled(float x, float y, float slant, int radius) {
   const int rows = 2 * radius + 1, columns = kPatchStride;
-  const cv::Mat image = noise();
+  const cv::Mat image = synthetic::noise({kWidth + 2 * kMargin, kHeight + 2 * kMargin}, 3);
   constexpr float kUntouched = -1e6f;
   std::vector<float> patch(static_cast<std::size_t>(rows * columns + 1), kUntouched);
   samplePatch(image, kMargin, x, y, slant, radius, patch.data());
@@ -46,38 +40,15 @@ void expectSampled(float x, float y, float slant, int radius) {
   EXPECT_EQ(patch.back(), kUntouched);
 }
 
-TEST(SamplePatch, GivesThePixelsAtWholePositions) {
+TEST(SamplePatch, InterpolatesBetweenPixelsOnRowsShiftedByTheSlant) {
   expectSampled(10.f, 8.f, 0.f, 2);
   expectSampled(0.f, 0.f, 0.f, 3);  // reaches into the margin
-}
-
-TEST(SamplePatch, InterpolatesBetweenPixels) {
   expectSampled(10.25f, 8.f, 0.f, 2);
   expectSampled(10.f, 8.75f, 0.f, 2);
-  expectSampled(10.6f, 8.3f, 0.f, 3);
   expectSampled(-0.4f, -0.7f, 0.f, 2);
-}
-
-TEST(SamplePatch, SlantShiftsRowsFromTheCentre) {
   expectSampled(12.f, 9.f, 1.f, 2);  // by whole pixels
   expectSampled(12.3f, 9.6f, 0.3f, 3);
   expectSampled(12.3f, 9.6f, -0.7f, 3);
-}
-
-TEST(SamplePatch, IsTheSameToTheBitWithAndWithoutVectors) {
-  cv::Mat image(120, 150, CV_8U);
-  cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
-  cv::RNG random(7);
-  constexpr int kBorder = 50;
-  for (int trial = 0; trial < 500; ++trial) {
-    const float x = random.uniform(0.f, 49.f), y = random.uniform(0.f, 19.f), slant = random.uniform(-0.8f, 0.8f);
-    const int radius = 1 + trial % 7;
-    ofEveryKernel([&] {
-      std::vector<float> samples(static_cast<std::size_t>((2 * radius + 1) * kPatchStride));
-      samplePatch(image, kBorder, x, y, slant, radius, samples.data());
-      return samples;
-    });
-  }
 }
 
 }  // namespace test_patch_sampling
@@ -86,11 +57,7 @@ namespace test_slanted_patch {
 
 constexpr int kMargin = 40;
 
-cv::Mat noise(unsigned seed) {
-  cv::Mat image(130, 160, CV_8U);
-  cv::RNG(seed).fill(image, cv::RNG::UNIFORM, 0, 256);
-  return image;
-}
+const cv::Size kSize(160, 130);
 
 /// What a patch says of an image, from its definition.
 struct Expected {
@@ -129,7 +96,7 @@ Expected define(const cv::Mat& left, const cv::Mat& right, float x, float y, flo
 }
 
 TEST(SlantedPatch, SaysWhatItsDefinitionSays) {
-  const cv::Mat left = noise(3), right = noise(5);
+  const cv::Mat left = synthetic::noise(kSize, 3), right = synthetic::noise(kSize, 5);
   cv::RNG random(7);
   for (int trial = 0; trial < 20; ++trial) {
     SlantedPatch patch;
@@ -159,7 +126,7 @@ std::vector<float> everythingOf(const cv::Mat& left, const cv::Mat& right, float
 }
 
 TEST(SlantedPatch, IsTheSameToTheBitWithAndWithoutVectors) {
-  const cv::Mat left = noise(7), right = noise(9);
+  const cv::Mat left = synthetic::noise(kSize, 7), right = synthetic::noise(kSize, 9);
   cv::RNG random(11);
   for (int trial = 0; trial < 200; ++trial) {
     const float x = random.uniform(5.f, 70.f), y = random.uniform(0.f, 49.f), slant = random.uniform(-0.8f, 0.8f);

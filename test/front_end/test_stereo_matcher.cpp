@@ -6,9 +6,7 @@
 
 namespace sdvo {
 
-struct Views {
-  cv::Mat left, right;
-};
+using synthetic::Views;
 
 namespace test_stereo_matcher {
 
@@ -51,9 +49,9 @@ TEST(StereoMatcher, RecoversConstantDisparitiesAndAResidualMisalignment) {
 
 /// Disparities of a plane that crosses the middle row at `middle` px and grows by `slant` px a row: the ground, whose
 /// slant is baseline / height. Returns the root mean square of the errors, px.
-double slantedPlaneError(double middle, double slant) {
+double slantedPlaneError(double middle, double slant, double dv = 0.0) {
   const auto disparity = [=](double v) { return middle + slant * (v - 0.5 * kSize.height); };
-  const Views pair = texturedPair(disparity);
+  const Views pair = texturedPair(disparity, dv);
   const std::vector<cv::Point2f> positions = grid(disparity(kSize.height));
   const std::vector<StereoMatch> matches = StereoMatcher({}).match(pair.left, pair.right, positions);
   EXPECT_GE(matches.size(), positions.size() * 8 / 10);
@@ -71,6 +69,7 @@ TEST(StereoMatcher, FollowsSlantedPlanes) {
   EXPECT_LT(slantedPlaneError(45.0, 0.2), 0.08);
   EXPECT_LT(slantedPlaneError(70.0, 0.33), 0.15);
   EXPECT_LT(slantedPlaneError(60.0, -0.2), 0.08);
+  EXPECT_LT(slantedPlaneError(45.0, 0.2, 1.1), 0.08);
 }
 
 TEST(StereoMatcher, RefusesEpipolarResidualsBeyondTheLimit) {
@@ -141,22 +140,15 @@ int countFound(const Views& pair, float step, const EpipolarOptions& epipolar = 
 }
 
 /// Disparities that grow with the rows as the ground's do, in a view of these grey levels.
-Views slantedPair(const std::function<double(double u, double v)>& grey, double slant, double dv = 0.0) {
-  return {synthetic::render(kSize, grey), synthetic::render(kSize, [&](double u, double v) {
-            return grey(u + 30.0 + slant * (v - dv - 80.0), v - dv);
-          })};
+Views slantedPair(const std::function<double(double u, double v)>& grey, double slant) {
+  return {synthetic::render(kSize, grey),
+          synthetic::render(kSize, [&](double u, double v) { return grey(u + 30.0 + slant * (v - 80.0), v); })};
 }
 
 /// A smooth surface of disparity `d` everywhere, the right view `dv` lower.
 Views smoothPair(double d, double dv) {
   const synthetic::Texture texture(3, 6.0, 90.0);
   return {synthetic::render(kSize, texture), synthetic::render(kSize, texture, d, dv)};
-}
-
-cv::Mat noise(unsigned seed) {
-  cv::Mat image(kSize, CV_8U);
-  cv::RNG(seed).fill(image, cv::RNG::UNIFORM, 0, 256);
-  return image;
 }
 
 /// The part of `image` that a shift by (-d, dv) carries into the picture; the rest comes from `elsewhere`.
@@ -167,20 +159,6 @@ cv::Mat shifted(const cv::Mat& image, int d, int dv, const cv::Mat& elsewhere) {
       if (u + d >= 0 && u + d < kSize.width && v - dv >= 0 && v - dv < kSize.height)
         result.at<std::uint8_t>(v, u) = image.at<std::uint8_t>(v - dv, u + d);
   return result;
-}
-
-TEST(EpipolarSearch, MeasuresDisparityAndRowToAFewHundredths) {
-  for (const auto& [d, dv] : std::vector<std::pair<double, double>>{
-           {12.0, 0.0}, {12.0, -2.0}, {12.0, 2.0}, {7.3, -0.6}, {31.75, 1.4}, {1.2, 0.3}}) {
-    const Views pair = smoothPair(d, dv);
-    for (const cv::Point2f& position :
-         {cv::Point2f(150.f, 80.f), cv::Point2f(201.3f, 61.6f), cv::Point2f(90.f, 99.5f)}) {
-      const auto found = find(pair, position);
-      ASSERT_TRUE(found) << position << ", disparity " << d << ", dv " << dv;
-      EXPECT_NEAR(found->x, d, 0.06) << position << ", dv " << dv;
-      EXPECT_NEAR(found->y, dv, 0.06) << position << ", disparity " << d;
-    }
-  }
 }
 
 /// Waves so short that an alignment from the wrong row ends at another one.
@@ -195,18 +173,6 @@ TEST(EpipolarSearch, LooksAtTheRowsAboveAndBelow) {
       right += found && std::abs(found->x - 14.f) < 0.1f && std::abs(found->y - dv) < 0.1;
     }
     EXPECT_GE(right, tried * 8 / 10) << "dv " << dv;
-  }
-}
-
-TEST(EpipolarSearch, FollowsASlantedSurface) {
-  const synthetic::Texture texture(5, 8.0, 90.0);
-  constexpr double kDv = 1.3;  // px that the right view is lower
-  for (const double slant : {0.3, -0.3}) {
-    const auto found =
-        find(slantedPair([&](double u, double v) { return texture.at(u, v); }, slant, kDv), {160.f, 82.4f});
-    ASSERT_TRUE(found) << slant;
-    EXPECT_NEAR(found->x, 30.0 + slant * 2.4, 0.1) << slant;
-    EXPECT_NEAR(found->y, kDv, 0.1) << slant;
   }
 }
 
@@ -238,7 +204,7 @@ TEST(EpipolarSearch, WhatIsFlatFollowsTheNoiseAndNotTheLight) {
 /// A strip that repeats itself.
 TEST(EpipolarSearch, RefusesWhatLooksTheSameElsewhereOnTheRow) {
   constexpr int kPeriod = 40;
-  cv::Mat left = noise(3);
+  cv::Mat left = synthetic::noise(kSize, 3);
   for (int u = kPeriod; u < kSize.width; ++u) left.col(u - kPeriod).copyTo(left.col(u));
   cv::Mat disturbed(kSize, CV_16S), right;
   cv::RNG(4).fill(disturbed, cv::RNG::NORMAL, 0.0, 4.0);
@@ -256,8 +222,8 @@ TEST(EpipolarSearch, HalfResolutionBlocksAreCentredOnThePosition) {
     // Half-resolution pixel h covers 2 h and 2 h + 1; a block has 16 x 9 of them, 8 to the left of its centre.
     const int x = 2 * (position.x / 2), y = 2 * (position.y / 2);
     const cv::Rect block(x - 16, y - 8, 32, 18);
-    const cv::Mat left = noise(5);
-    cv::Mat right = noise(6);
+    const cv::Mat left = synthetic::noise(kSize, 5);
+    cv::Mat right = synthetic::noise(kSize, 6);
     left(block).copyTo(right(block - cv::Point(kDisparity, 0)));
     EpipolarOptions strict;
     strict.uniqueness = 0.1;  // a row and a column of noise in the block are 0.17 of what noise everywhere is
@@ -271,10 +237,10 @@ TEST(EpipolarSearch, HalfResolutionBlocksAreCentredOnThePosition) {
 TEST(EpipolarSearch, UniquenessIsARatioToTheBestBlockElsewhere) {
   // The true block, damaged a little, against noise: their ratio is known.
   constexpr int kDisparity = 20;
-  const cv::Mat left = noise(7);
-  cv::Mat right = shifted(left, kDisparity, 0, noise(8));
+  const cv::Mat left = synthetic::noise(kSize, 7);
+  cv::Mat right = shifted(left, kDisparity, 0, synthetic::noise(kSize, 8));
   // Half of the block's rows is replaced.
-  noise(9).rowRange(80, 100).copyTo(right.rowRange(80, 100));
+  synthetic::noise(kSize, 9).rowRange(80, 100).copyTo(right.rowRange(80, 100));
   EpipolarOptions options;
   options.min_correlation = 0.0;
   options.uniqueness = 0.3;
@@ -284,19 +250,13 @@ TEST(EpipolarSearch, UniquenessIsARatioToTheBestBlockElsewhere) {
 }
 
 TEST(EpipolarSearch, RefusesDisparitiesBeyondTheLargest) {
-  const cv::Mat left = noise(11);
-  const Views pair{left, shifted(left, 60, 0, noise(12))};
+  const cv::Mat left = synthetic::noise(kSize, 11);
+  const Views pair{left, shifted(left, 60, 0, synthetic::noise(kSize, 12))};
   EpipolarOptions options;
   options.max_disparity = 64.0;
   EXPECT_TRUE(find(pair, {200.f, 80.f}, options));
   options.max_disparity = 40.0;
   EXPECT_FALSE(find(pair, {200.f, 80.f}, options));
-}
-
-TEST(EpipolarSearch, RefusesPointsThatAreFurtherRightInTheRightView) {
-  const cv::Mat left = noise(13);
-  EXPECT_FALSE(find({left, shifted(left, -12, 0, noise(14))}, {150.f, 80.f}));
-  EXPECT_TRUE(find({left, shifted(left, 12, 0, noise(14))}, {150.f, 80.f}));
 }
 
 TEST(EpipolarSearch, RefusesAnEdgeAlongTheRow) {
@@ -383,8 +343,7 @@ TEST(EpipolarSearch, FindsTheSameToTheBitWithAndWithoutVectors) {
   const Views pair = smoothPair(17.3, 0.6);
   int compared = 0;
   for (float v = 0.f; v < 160.f; v += 7.3f)
-    for (float u = 0.f; u < 320.f; u += 5.7f)
-      compared += ofEveryKernel([&] { return find(pair, {u, v}); }).has_value();
+    for (float u = 0.f; u < 320.f; u += 5.7f) compared += ofEveryKernel([&] { return find(pair, {u, v}); }).has_value();
   EXPECT_GT(compared, 500);
 }
 
