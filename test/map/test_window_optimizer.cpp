@@ -90,7 +90,9 @@ Window disturbedWindow(const RigCalibration& truth, const std::function<Eigen::I
 
 TEST(WindowOptimizer, FindsPosesAndCalibrationOfExactMeasurements) {
   Window window = disturbedWindow(calibrationOf(0.3, -1.0));
+  const Eigen::Matrix4d first = window.T_camera_origin[0].matrix();
   solved(window, 20);
+  EXPECT_EQ(window.T_camera_origin[0].matrix(), first) << "which is held";
   for (int f = 0; f < 5; ++f) {
     const Vector6d error = logSE3(window.T_camera_origin[f] * syntheticPose(f));
     EXPECT_LT(error.head<3>().norm(), 2e-3) << "pose " << f;
@@ -328,14 +330,6 @@ TEST(WindowOptimizer, InformationOfTheCalibrationIsWithoutThePrior) {
   EXPECT_LT((strong.calibration.value - truth.value).norm(), 0.2 * (weak.calibration.value - truth.value).norm());
 }
 
-TEST(WindowOptimizer, ThePriorPullsTowardsItsMean) {
-  Window window = disturbedWindow(RigCalibration{});
-  window.calibration_prior.mean << 0.4, 0.3;
-  window.calibration_prior.information = 1e9 * RigCalibration::Matrix::Identity();
-  solved(window, kSteps, withoutCommonErrors());
-  EXPECT_LT((window.calibration.value - window.calibration_prior.mean).norm(), 1e-3);
-}
-
 TEST(WindowOptimizer, PosesFollowTheCalibrationByTheirDerivative) {
   constexpr double kStep = 1e-3;  // px
   const RigCalibration truth = calibrationOf(0.2, -0.5);
@@ -460,13 +454,6 @@ TEST(WindowOptimizer, ASightingThatCannotBeIsNotUsed) {
   const WindowSolution solution = solved(window, 20);
   for (int i = 0; i < 5; ++i) EXPECT_GT(solution.squares[i], 2500.0);
   EXPECT_LT(logSE3(window.T_camera_origin[4] * syntheticPose(4)).norm(), 0.01);
-}
-
-TEST(WindowOptimizer, HoldsTheFirstPose) {
-  Window window = disturbedWindow(RigCalibration{});
-  const Eigen::Matrix4d before = window.T_camera_origin[0].matrix();
-  solved(window);
-  EXPECT_EQ(before, window.T_camera_origin[0].matrix());
 }
 
 TEST(WindowOptimizer, OneWrongSightingDoesNotMoveTheRest) {
