@@ -42,17 +42,6 @@ TEST(GeneticSearch, TheCostIsThatOfThePose) {
   }
 }
 
-TEST(GeneticSearch, AnswersTheSameToTheSameSeed) {
-  const SeenPoints scene = seenPoints(3, 150, 0.3, 0.6);
-  for (const bool adaptive : {false, true}) {
-    EXPECT_TRUE(equal(search(scene, {}, adaptive, 200, 5), search(scene, {}, adaptive, 200, 5)));
-    int different = 0;
-    for (unsigned seed = 6; seed < 10; ++seed)
-      different += !equal(search(scene, {}, adaptive, 200, 5), search(scene, {}, adaptive, 200, seed));
-    EXPECT_GT(different, 0);
-  }
-}
-
 /// The ablation: learning steers the adaptive search, and only that one.
 TEST(GeneticSearch, LearningSteersTheAdaptiveSearchAlone) {
   const SeenPoints scene = seenPoints(4, 150, 0.3, 0.7);

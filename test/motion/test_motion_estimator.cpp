@@ -144,28 +144,6 @@ TEST(MotionEstimator, CovarianceIsCalibratedWhereTheKernelBends) {
   }
 }
 
-TEST(MotionEstimator, CovarianceGrowsWithTheNoise) {
-  MotionEstimatorOptions options;
-  options.inlier_threshold = 10.0;
-  options.kernel_scale = 20.0;
-  const auto variance = [&](double noise) { return estimate(seenPoints(5, 200, noise), options).covariance.trace(); };
-  // Variance goes with the square of the noise; 594 degrees of freedom make the same draw agree to far better than
-  // this.
-  EXPECT_NEAR(variance(0.8) / variance(0.2), 16.0, 2.0);
-}
-
-TEST(MotionEstimator, IsDeterministicForASeed) {
-  const SeenPoints seen = seenPoints(3, 200, 0.5, 0.6);
-  const MotionEstimator estimator({});
-  const MotionEstimate first = estimator.estimate(synthetic::camera(), seen.correspondences);
-  estimator.estimate(synthetic::camera(), seenPoints(4, 50, 0.5, 0.2).correspondences);
-  for (const MotionEstimate& again : {estimator.estimate(synthetic::camera(), seen.correspondences), estimate(seen)}) {
-    EXPECT_EQ(first.T_current_reference.matrix(), again.T_current_reference.matrix());
-    EXPECT_EQ(first.covariance, again.covariance);
-    EXPECT_EQ(first.inliers, again.inliers);
-  }
-}
-
 /// Most points of a far hedge, a few near ones: 700 px of focal length, points 70 to 80 m and 8 to 12 m away.
 Correspondences farPoints(unsigned seed, const StereoCamera& camera) {
   std::mt19937 random(seed);

@@ -3,7 +3,6 @@
 #include <set>
 
 #include "../../src/motion/sample_consensus.hpp"
-#include "../said.hpp"
 #include "seen_points.hpp"
 
 namespace sdvo {
@@ -87,16 +86,6 @@ TEST_P(EveryMethod, RecoversTheMotionAmongSixtyPercentOutliers) {
   }
 }
 
-TEST_P(EveryMethod, IsExactWithoutNoise) {
-  const SeenPoints scene = seenPoints(5, 60, 0.0, 0.3);
-  const Consensus consensus = search(scene, GetParam());
-  ASSERT_TRUE(consensus.found);
-  EXPECT_EQ(inliersOf(consensus, scene), scene.inliers);
-  const Eigen::Isometry3d error = trueMotion().inverse() * consensus.T_current_reference;
-  EXPECT_LT(error.translation().norm(), 1e-4);
-  EXPECT_LT(logSO3(error.linear()).norm(), 1e-5);
-}
-
 TEST_P(EveryMethod, EqualSeedsGiveEqualResultsAndOthersDiffer) {
   const SeenPoints scene = seenPoints(2, 200, 0.5, 0.5);
   const Consensus first = search(scene, GetParam(), 7), again = search(scene, GetParam(), 7);
@@ -125,13 +114,6 @@ TEST_P(EveryMethod, FindsNothingInTooFewCorrespondences) {
 
 INSTANTIATE_TEST_SUITE_P(ByName, EveryMethod, testing::Values("ransac", "msac", "lo_ransac", "gasac", "adaptive_gasac"),
                          [](const auto& parameter) { return std::string(parameter.param); });
-
-TEST(SampleConsensus, RefusesUnknownNames) {
-  SampleConsensusOptions options;
-  std::vector<Option> list = listOptions(options);
-  const std::string error = errorOf([&] { setOption(list, "consensus", "prosac"); });
-  EXPECT_TRUE(contains(error, "adaptive_gasac")) << error;
-}
 
 /// A minimal sample carries the noise of its three points; optimised over all of its inliers a pose gathers more of
 /// them.

@@ -3,8 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core/eigen.hpp>
 #include <random>
 #include <vector>
 
@@ -69,39 +67,6 @@ TEST(ThreePointPose, EveryCandidateSeesThePointsAlongTheRays) {
     }
   }
   EXPECT_EQ(most, 4u);
-}
-
-TEST(ThreePointPose, FindsWhatOpenCvFinds) {
-  std::mt19937 random(3);
-  int solutions = 0, missing = 0;
-  for (int trial = 0; trial < 500; ++trial) {
-    const Sample sample = randomSample(random);
-    std::vector<cv::Point3d> points;
-    std::vector<cv::Point2d> pixels;
-    for (std::size_t k = 0; k < 3; ++k) {
-      points.emplace_back(sample.points[k].x(), sample.points[k].y(), sample.points[k].z());
-      pixels.emplace_back(sample.rays[k].x() / sample.rays[k].z(), sample.rays[k].y() / sample.rays[k].z());
-    }
-    std::vector<cv::Mat> rotations, translations;
-    cv::solveP3P(points, pixels, cv::Matx33d::eye(), cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
-    const PoseCandidates candidates = solveThreePointPose(sample.points, sample.rays);
-    for (std::size_t s = 0; s < rotations.size(); ++s) {
-      Eigen::Vector3d rotation, translation;
-      cv::cv2eigen(rotations[s], rotation);
-      cv::cv2eigen(translations[s], translation);
-      Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-      T.linear() = expSO3(rotation);
-      T.translation() = translation;
-      double error = 0.0;  // OpenCV's may see points behind the camera, and not be exact
-      for (std::size_t k = 0; k < 3; ++k)
-        error = std::max(error, ((T * sample.points[k]).normalized() - sample.rays[k]).norm());
-      if (!(error < 1e-7)) continue;
-      ++solutions;
-      missing += !(distanceToNearest(candidates, T) < 1e-4);
-    }
-  }
-  EXPECT_GT(solutions, 800);
-  EXPECT_LE(missing, 2);
 }
 
 /// Sides 12 and 23 and their angles alike: the cubic has no cubic term.
