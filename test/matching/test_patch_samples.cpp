@@ -4,7 +4,6 @@
 #include <random>
 
 #include "../../src/matching/patch_samples.hpp"
-#include "../kernels.hpp"
 
 namespace sdvo::test_patch_samples {
 
@@ -109,27 +108,6 @@ TEST(PatchSamples, NoCornerOfTheSquareMayLieOutside) {
   EXPECT_FALSE(square.sample(noise.patch, {0.f, 0.f}, 1.51f * identity, values));
   EXPECT_TRUE(square.sample(noise.patch, {0.3f, 0.3f}, turned, values));
   EXPECT_FALSE(square.sample(noise.patch, {0.5f, 0.f}, turned, values));
-}
-
-TEST(PatchSamples, AreTheSameToTheBitWithAndWithoutVectors) {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<float> uniform(-1.f, 1.f);
-  const Noise noise(13, random);
-  const SampleSquare square;
-  for (int trial = 0; trial < 100; ++trial) {
-    const Eigen::Vector2f centre(uniform(random), uniform(random));
-    Eigen::Matrix2f grid = Eigen::Matrix2f::Identity();
-    for (int k = 0; k < 4; ++k) grid(k) += 0.1f * uniform(random);
-    ofEveryKernel([&] {
-      Samples of[4];
-      EXPECT_TRUE(square.sampleUpright(noise.patch, centre, of[0], of[1], of[2]));
-      const bool inside = square.sample(noise.patch, centre, grid, of[3]);
-      std::vector<float> all;
-      for (int s = 0; s < (inside ? 4 : 3); ++s)
-        for (int k = 0; k < square.count(); ++k) all.push_back(of[s][k]);
-      return all;
-    });
-  }
 }
 
 }  // namespace sdvo::test_patch_samples
