@@ -88,6 +88,41 @@ TEST_F(ArrivalLogTest, CameraInfoThatIsSlowerThanTheImagesIsNamedWithItsRate) {
   EXPECT_EQ(unpaired(), 190u);
 }
 
+TEST_F(ArrivalLogTest, LostImagesOfEitherSideAreNamed) {
+  const auto lose = [&](int begin, ArrivalLog::Input lost, int every) {
+    for (int i = begin; i < begin + 120; ++i) {
+      const double stamp = 100.0 + 0.05 * i, now = 0.05 * i;
+      if (i % every != 1) {
+        noteUsed(stamp, now);
+        continue;
+      }
+      for (const auto input :
+           {ArrivalLog::kLeftImage, ArrivalLog::kRightImage, ArrivalLog::kLeftInfo, ArrivalLog::kRightInfo})
+        if (input != lost) note(input, stamp, now);
+    }
+    return log_.explainLoss(0.05 * (begin + 119));
+  };
+  expectWords(lose(0, ArrivalLog::kRightImage, 3), {"left images have no right one within half a period"});
+  expectWords(lose(120, ArrivalLog::kLeftImage, 2), {"right images have no left one within half a period"});
+  log_.explainLoss(22.0);  // what waits for partners is given up
+  EXPECT_EQ(unpaired(), 40u + 60u);
+}
+
+/// Stamps of free-running cameras.
+TEST_F(ArrivalLogTest, TheSpreadOfStampsThatDifferIsSaid) {
+  for (int i = 0; i < 100; ++i) {
+    const double stamp = 100.0 + 0.05 * i, apart = 1e-3 * (i % 9 - 4);
+    if (std::abs(apart) < 1.5e-3) {
+      noteUsed(stamp, 0.05 * i);
+      continue;
+    }
+    for (const auto input : {ArrivalLog::kLeftImage, ArrivalLog::kLeftInfo}) note(input, stamp, 0.05 * i);
+    for (const auto input : {ArrivalLog::kRightImage, ArrivalLog::kRightInfo}) note(input, stamp + apart, 0.05 * i);
+  }
+  expectWords(log_.explainLoss(5.0), {"stereo pairs in 5 s are not used", "the nearest stamps of left and right are 2.",
+                                      "ms apart, more than sync_tolerance (1.0 ms): set sync_tolerance to 0.0"});
+}
+
 /// The subscribers do not connect at once.
 TEST_F(ArrivalLogTest, ImagesFromBeforeAllTopicsWereThereAreNotCounted) {
   for (int i = 0; i < 10; ++i) note(ArrivalLog::kLeftImage, 100.0 + 0.05 * i, 0.05 * i);
@@ -152,86 +187,78 @@ TEST_F(ApproximateArrivalLogTest, DoesNotAdviseWhatIsSetAlready) {
   EXPECT_FALSE(contains(text, "approximate_sync")) << text;
 }
 
-/// Of a whole recording.
-class RecordedArrivals : public ::testing::Test {
- protected:
-  static constexpr double kBegin = 1.7e9, kPeriod = 0.05;  // s
+constexpr double kBegin = 1.7e9;  // s
 
-  RecordedArrivals() { log_.begin({"/left", "/right", "/left_info", "/right_info"}, 0.0); }
+/// Of a whole recording.
+struct RecordedArrivals {
+  RecordedArrivals() { log.begin({"/left", "/right", "/left_info", "/right_info"}, 0.0); }
 
   void note(int input, double stamp, double now) {
-    log_.note(static_cast<ArrivalLog::Input>(input), nanoseconds(stamp), now);
+    log.note(static_cast<ArrivalLog::Input>(input), nanoseconds(stamp), now);
+  }
+
+  /// One message each, `apart` s.
+  void note(const std::vector<int>& inputs, double apart) {
+    for (const int input : inputs) note(input, kBegin + apart * input, kBegin);
   }
 
   /// `count` pairs, which arrive 20 ms after their time, with stamps of another clock.
   void notePairs(int count, double clock = 0.0, int every = 0, double begin = kBegin) {
     for (int i = 0; i < count; ++i) {
       if (every > 0 && i % every == 0) continue;
-      const double time = begin + i * kPeriod, now = time + 0.02;
+      const double time = begin + i * 0.05, now = time + 0.02;
       for (int input = 0; input < ArrivalLog::kInputs; ++input) note(input, time + clock, now);
       const std::int64_t stamp = nanoseconds(time + clock);
-      log_.notePair(stamp, stamp, now);
+      log.notePair(stamp, stamp, now);
     }
   }
 
-  static void expectFinding(const Finding& finding, Verdict verdict, const std::string& words) {
-    EXPECT_EQ(finding.verdict, verdict) << finding.text();
-    EXPECT_TRUE(contains(finding.text(), words)) << finding.text();
-  }
-
-  UnusedInput unused_{"pairs", 1.0};
-  StereoInputOptions options_;
-  ArrivalLog log_{options_, unused_, std::numeric_limits<double>::infinity()};
+  UnusedInput unused{"pairs", 1.0};
+  StereoInputOptions options;
+  ArrivalLog log{options, unused, std::numeric_limits<double>::infinity()};
 };
 
-TEST_F(RecordedArrivals, SteadyPairsAreInOrderHoweverLongTheRecording) {
-  notePairs(4000);
-  EXPECT_NEAR(log_.pairRate(), 20.0, 1e-3);
-  expectFinding(log_.checkTopics(), Verdict::kOk, "4000 pairs, 20.0 Hz");
-  expectFinding(log_.checkStamps(), Verdict::kOk, "longest gap 50.0 ms, 0.0 % without partner");
+void expectFinding(const Finding& finding, Verdict verdict, const std::string& words) {
+  EXPECT_EQ(finding.verdict, verdict) << finding.text();
+  expectWords(finding.text(), {words});
 }
 
-TEST_F(RecordedArrivals, TheTopicOnWhichNothingComesIsNamed) {
-  for (const int input : {0, 1, 2}) note(input, kBegin, kBegin);
-  expectFinding(log_.checkTopics(), Verdict::kFail, "/right_info");
-}
-
-TEST_F(RecordedArrivals, TheCauseOfNoPairIsNamed) {
-  for (const int input : {0, 1, 2, 3}) note(input, kBegin + input, kBegin);
-  expectFinding(log_.checkTopics(), Verdict::kFail, "no synchronised stereo pair; received: /left 1");
-}
-
-TEST_F(RecordedArrivals, ARateBeyondWhatSuits) {
-  for (int i = 0; i < 4; ++i) notePairs(1, 0.0, 0, kBegin + i);
-  expectFinding(log_.checkTopics(), Verdict::kWarn, "4 pairs, 1.0 Hz");
-}
-
-TEST_F(RecordedArrivals, AnotherClock) {
-  notePairs(40, -1.6e9);
-  expectFinding(log_.checkStamps(), Verdict::kWarn, "another clock");
-}
-
-TEST_F(RecordedArrivals, MissingPairs) {
-  notePairs(60, 0.0, 10);
-  expectFinding(log_.checkStamps(), Verdict::kWarn, "missing");
-}
-
-TEST_F(RecordedArrivals, ImagesWithoutPartner) {
-  notePairs(40);
-  for (int i = 1; i < 5; ++i) note(0, kBegin + 0.001 * i, kBegin + 2.0);
-  expectFinding(log_.checkStamps(), Verdict::kWarn, "set sync_tolerance to 0.005");
-}
-
-TEST_F(RecordedArrivals, StampsThatFall) {
-  notePairs(40);
-  notePairs(1);
-  expectFinding(log_.checkStamps(), Verdict::kWarn, "fall");
-}
-
-TEST_F(RecordedArrivals, OnePairIsTooFew) {
-  notePairs(1);
-  expectFinding(log_.checkTopics(), Verdict::kOpen, "one pair alone");
-  expectFinding(log_.checkStamps(), Verdict::kOpen, "no pairs");
+TEST(ArrivalLog, FindingsOfARecordingNameItsFault) {
+  const struct {
+    std::function<void(RecordedArrivals&)> arrivals;
+    Verdict of_topics, of_stamps;
+    std::string topics, stamps;
+  } cases[] = {
+      {[](auto& of) { of.notePairs(4000); }, Verdict::kOk, Verdict::kOk, "4000 pairs, 20.0 Hz",
+       "longest gap 50.0 ms, 0.0 % without partner"},
+      {[](auto& of) { of.notePairs(1); }, Verdict::kOpen, Verdict::kOpen, "one pair alone", "no pairs"},
+      {[](auto& of) {
+         of.note({0, 1, 2}, 0.0);
+       },
+       Verdict::kFail, Verdict::kOpen, "/right_info", ""},
+      {[](auto& of) {
+         of.note({0, 1, 2, 3}, 1.0);
+       },
+       Verdict::kFail, Verdict::kOpen, "no synchronised stereo pair; received: /left 1", ""},
+      {[](auto& of) {
+         for (int i = 0; i < 4; ++i) of.notePairs(1, 0.0, 0, kBegin + i);
+       },
+       Verdict::kWarn, Verdict::kOk, "4 pairs, 1.0 Hz", ""},
+      {[](auto& of) { of.notePairs(40, -1.6e9); }, Verdict::kOk, Verdict::kWarn, "", "another clock"},
+      {[](auto& of) { of.notePairs(60, 0.0, 10); }, Verdict::kOk, Verdict::kWarn, "", "missing"},
+      {[](auto& of) {
+         of.notePairs(40);
+         for (int i = 1; i < 5; ++i) of.note(0, kBegin + 0.001 * i, kBegin + 2.0);
+       },
+       Verdict::kOk, Verdict::kWarn, "", "set sync_tolerance to 0.005"},
+      {[](auto& of) { of.notePairs(40), of.notePairs(1); }, Verdict::kOk, Verdict::kWarn, "", "fall"},
+  };
+  for (const auto& c : cases) {
+    RecordedArrivals recorded;
+    c.arrivals(recorded);
+    expectFinding(recorded.log.checkTopics(), c.of_topics, c.topics);
+    expectFinding(recorded.log.checkStamps(), c.of_stamps, c.stamps);
+  }
 }
 
 }  // namespace sdvo::test_arrival_log
