@@ -72,19 +72,6 @@ TEST(Options, PathsFollowTheComposition) {
                                              "on", "colour", "height"}));
 }
 
-TEST(Options, OutOfRangeIsNamedWithPathValueAndRange) {
-  Outer outer;
-  outer.far_side.width = 2.25;
-  expectError([&] { checked(outer); }, {"far_side/width", "2.25", "0.5", "2", "m"});
-  outer = {};
-  outer.near_side.count = 11;
-  expectError([&] { checked(outer); }, {"near_side/count", "11", "[1, 10]"});
-  outer = {};
-  std::vector<Option> options = listOptions(outer);
-  expectError([&] { setOption(options, "colour", "blue"); }, {"colour", "blue", "red", "green"});
-  EXPECT_EQ(outer.colour, Colour::kRed);
-}
-
 TEST(Options, EndsOfTheRangeAreInsideAndNeighboursAreNot) {
   Outer outer;
   outer.near_side.width = 0.5;
@@ -191,7 +178,7 @@ TEST(Options, SetRefusesTextOfAnotherTypeAndValuesOutOfRange) {
       Outer outer;
       std::vector<Option> options = listOptions(outer);
       const std::string before = hashOptions(options);
-      expectError([&, n = name] { setOption(options, n, text); }, {name});
+      expectError([&, n = name] { setOption(options, n, text); }, {name, text});
       EXPECT_EQ(hashOptions(options), before) << name << " took '" << text << "'";
     }
 }
@@ -226,22 +213,20 @@ TEST(Options, ClampMovesNumbersToTheNearestEnd) {
 }
 
 TEST(Options, HashTellsOptionsApart) {
-  const auto hash = [](Outer outer) { return hashOptions(listOptions(outer)); };
-  EXPECT_EQ(hash(Outer()), hash(Outer()));
-  EXPECT_EQ(hash(Outer()).size(), 16u);
-
-  std::set<std::string> hashes = {hash(Outer())};
-  const auto expectNew = [&](const std::function<void(Outer&)>& change) {
-    Outer outer;
-    change(outer);
-    EXPECT_TRUE(hashes.insert(hash(outer)).second) << "options differ, their hashes do not";
-  };
-  expectNew([](Outer& o) { o.near_side.count = 6; });
-  expectNew([](Outer& o) { o.far_side.count = 6; });
-  expectNew([](Outer& o) { o.on = false; });
-  expectNew([](Outer& o) { o.colour = Colour::kGreen; });
-  expectNew([](Outer& o) { o.height = 3.0 + 1e-12; });
-  expectNew([](Outer& o) { o.height = std::nextafter(3.0, 4.0); });
+  std::set<std::string> hashes;
+  const std::vector<std::function<void(Outer&)>> changes = {[](Outer&) {},
+                                                            [](Outer& o) { o.near_side.count = 6; },
+                                                            [](Outer& o) { o.far_side.count = 6; },
+                                                            [](Outer& o) { o.on = false; },
+                                                            [](Outer& o) { o.colour = Colour::kGreen; },
+                                                            [](Outer& o) { o.height = 3.0 + 1e-12; },
+                                                            [](Outer& o) { o.height = std::nextafter(3.0, 4.0); }};
+  for (const auto& change : changes) {
+    Outer outer, same;
+    change(outer), change(same);
+    EXPECT_TRUE(hashes.insert(hashOptions(listOptions(outer))).second) << "options differ, their hashes do not";
+    EXPECT_EQ(hashes.count(hashOptions(listOptions(same))), 1u);
+  }
 }
 
 }  // namespace sdvo::test_options

@@ -49,14 +49,15 @@ void expectRefused(const Refusals<StereoFeatures>& refusals) {
       threeFeatures(), [](const StereoFeatures& features) { features.check(); }, refusals);
 }
 
-TEST(StereoFeatures, NamesTheArrayOfAnotherLength) {
+TEST(StereoFeatures, NamesTheArrayOfAnotherLengthOrTheCameraThatIsNone) {
   expectRefused({{[](StereoFeatures& f) { f.v.pop_back(); }, "v"},
                  {[](StereoFeatures& f) { f.disparity.push_back(1.f); }, "disparity"},
                  {[](StereoFeatures& f) { f.dv.clear(); }, "dv"},
                  {[](StereoFeatures& f) { f.size.pop_back(); }, "size"},
                  {[](StereoFeatures& f) { f.angle.pop_back(); }, "angle"},
                  {[](StereoFeatures& f) { f.response.pop_back(); }, "response"},
-                 {[](StereoFeatures& f) { f.descriptors.pop_back(); }, "descriptors"}});
+                 {[](StereoFeatures& f) { f.descriptors.pop_back(); }, "descriptors"},
+                 {[](StereoFeatures& f) { f.camera.baseline = 0.0; }, "baseline"}});
 }
 
 TEST(StereoFeatures, RefusesNumbersThatMeanNothing) {
@@ -143,10 +144,6 @@ TEST(StereoFeatures, RowsCompareWhereAllOfTheirKindIsEqual) {
     change(other);
     EXPECT_FALSE(kind == other);
   }
-}
-
-TEST(StereoFeatures, RefusesACameraThatIsNone) {
-  expectRefused({{[](StereoFeatures& f) { f.camera.baseline = 0.0; }, "baseline"}});
 }
 
 }  // namespace sdvo::test_stereo_features
