@@ -3,20 +3,14 @@
 #include <std_msgs/Int32.h>
 
 #include <atomic>
-#include <functional>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
 #include "../../src/ros/node/threads.hpp"
+#include "spin.hpp"
 
 namespace sdvo::rostest_callback_thread {
-
-bool waitUntil(const std::function<bool()>& condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
-  while (!condition() && ros::WallTime::now() < end) ros::WallDuration(0.001).sleep();
-  return condition();
-}
 
 std_msgs::Int32 message(int data) {
   std_msgs::Int32 message;
@@ -32,10 +26,7 @@ class Witness {
                                                   [this](const std_msgs::Int32::ConstPtr& m) { last_ = m->data; })) {}
 
   bool gets(int data) {
-    return waitUntil([&] {
-      ros::spinOnce();
-      return last_ == data;
-    });
+    return spinUntil([&] { return last_ == data; });
   }
 
  private:

@@ -4,16 +4,20 @@
 
 #include <functional>
 
-/// What comes from ROS, in the thread of a test.
 namespace sdvo {
 
-inline bool spinUntil(const std::function<bool()>& condition) {
+inline bool waitUntil(const std::function<bool()>& condition) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
-  while (!condition() && ros::WallTime::now() < end) {
-    ros::spinOnce();
-    ros::WallDuration(0.001).sleep();
-  }
+  while (!condition() && ros::WallTime::now() < end) ros::WallDuration(0.001).sleep();
   return condition();
+}
+
+/// What comes from ROS meanwhile, it takes in the thread of the test.
+inline bool spinUntil(const std::function<bool()>& condition) {
+  return waitUntil([&] {
+    ros::spinOnce();
+    return condition();
+  });
 }
 
 }  // namespace sdvo

@@ -32,33 +32,30 @@ TEST(ToGrey, GreyImagesAreNotCopied) {
   }
 }
 
-TEST(ToGrey, SixteenBitsAreScaledToEight) {
-  // 65535 -> 255, so 257 levels make one: 100 * 257 = 25700 = 0x6464.
-  const auto message = image("mono16", 3, 1, {0x00, 0x00, 0x64, 0x64, 0xff, 0xff});
-  const cv::Mat grey = toGrey(message);
-  ASSERT_EQ(grey.type(), CV_8UC1);
-  EXPECT_EQ(grey.at<std::uint8_t>(0, 0), 0);
-  EXPECT_EQ(grey.at<std::uint8_t>(0, 1), 100);
-  EXPECT_EQ(grey.at<std::uint8_t>(0, 2), 255);
-}
-
-TEST(ToGrey, SixteenBitsOfEitherOrderOfBytes) {
-  const auto message = image("mono16", 2, 1, {0x64, 0x65, 0xff, 0x00});
-  EXPECT_EQ(toGrey(message).at<std::uint8_t>(0, 0), 0x65);  // 0x6564 / 257 = 101
-  EXPECT_EQ(toGrey(message).at<std::uint8_t>(0, 1), 1);
-  message->is_bigendian = 1;
-  EXPECT_EQ(toGrey(message).at<std::uint8_t>(0, 0), 0x64);
-  EXPECT_EQ(toGrey(message).at<std::uint8_t>(0, 1), 0xfe);
-}
-
-TEST(ToGrey, CamerasOfFewerBitsFillTheRange) {
-  // 1023 and 341 of 10 bits.
-  const auto message = image("mono16", 2, 1, {0xff, 0x03, 0x55, 0x01});
-  const cv::Mat grey = toGrey(message, {0.0, 1023.0});
-  EXPECT_EQ(grey.at<std::uint8_t>(0, 0), 255);
-  EXPECT_EQ(grey.at<std::uint8_t>(0, 1), 85);
-  EXPECT_EQ(toGrey(message, {0.0, 4095.0}).at<std::uint8_t>(0, 0), 64);
-  EXPECT_EQ(toGrey(message, {341.0, 1023.0}).at<std::uint8_t>(0, 1), 0);
+TEST(ToGrey, SixteenBitsOfEitherOrderOfBytesAreScaledToEight) {
+  struct Case {
+    std::vector<std::uint8_t> data;
+    GreyRange range;
+    bool is_bigendian;
+    std::vector<int> grey;
+  };
+  const GreyRange all{0.0, 65535.0};
+  for (const Case& c : {
+           // 65535 -> 255, so 257 levels make one: 100 * 257 = 25700 = 0x6464.
+           Case{{0x00, 0x00, 0x64, 0x64, 0xff, 0xff}, all, false, {0, 100, 255}},
+           Case{{0x64, 0x65, 0xff, 0x00}, all, false, {0x65, 1}},
+           Case{{0x64, 0x65, 0xff, 0x00}, all, true, {0x64, 0xfe}},
+           // 1023 and 341 of 10 bits fill the range.
+           Case{{0xff, 0x03, 0x55, 0x01}, {0.0, 1023.0}, false, {255, 85}},
+           Case{{0xff, 0x03, 0x55, 0x01}, {0.0, 4095.0}, false, {64, 21}},
+           Case{{0xff, 0x03, 0x55, 0x01}, {341.0, 1023.0}, false, {255, 0}},
+       }) {
+    const auto message = image("mono16", static_cast<int>(c.grey.size()), 1, c.data);
+    message->is_bigendian = c.is_bigendian;
+    const cv::Mat grey = toGrey(message, c.range);
+    ASSERT_EQ(grey.type(), CV_8UC1);
+    EXPECT_EQ(std::vector<int>(grey.begin<std::uint8_t>(), grey.end<std::uint8_t>()), c.grey) << c.range.white;
+  }
 }
 
 TEST(ToGrey, ACompressedImageThatCannotBeDecodedIsNamedByItsFormat) {

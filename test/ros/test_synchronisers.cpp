@@ -3,13 +3,10 @@
 #include <sensor_msgs/Image.h>
 
 #include <boost/make_shared.hpp>
-#include <random>
 #include <vector>
 
-#include "../../src/check/arrival_log.hpp"
 #include "../../src/messages/stamps.hpp"
 #include "../../src/ros/synchronisation/synchronisers.hpp"
-#include "../said.hpp"
 
 namespace sdvo::test_synchronisers {
 
@@ -149,74 +146,6 @@ TEST(ApproximateSynchroniser, BeginsAnewWhenStampsFall) {
   EXPECT_GE(first, 15u);
   EXPECT_EQ(play(100.0), first);
   EXPECT_EQ(play(5000.0), first);
-}
-
-/// With the log of arrivals as in the nodelet: every pair is used, or counted once.
-struct JitterTest : ::testing::Test {
-  JitterTest() { log_.begin({"/l/image", "/r/image", "/l/info", "/r/info"}, 0.0); }
-
-  std::uint64_t unpaired() const { return unused_.count(UnusedInput::kUnpaired); }
-
-  const StereoInputOptions options_;
-  UnusedInput unused_{"pairs", 0.05};
-  ArrivalLog log_{options_, unused_};
-  int used = 0;
-  TriggerSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo>
-      synchroniser{options_.sync_queue_size, options_.pairing.sync_tolerance,
-                   [this](const auto& left, const auto& right, const auto&, const auto&) {
-                     ++used;
-                     log_.notePair(nanoseconds(left->header.stamp), nanoseconds(right->header.stamp), now);
-                   }};
-  double now = 0.0;
-
-  template <ArrivalLog::Input input, class Message>
-  void send(double stamp) {
-    const auto message = boost::make_shared<Message>();
-    message->header.stamp = ros::Time(stamp);
-    log_.note(input, nanoseconds(message->header.stamp), now);
-    synchroniser.add<input>(boost::shared_ptr<const Message>(message));
-  }
-
-  void send(int pair, double apart, bool has_left = true, bool has_right = true) {
-    now = 0.05 * pair;
-    const double left = 100.0 + 0.05 * pair, right = left + apart;
-    if (has_left) send<ArrivalLog::kLeftImage, sensor_msgs::Image>(left);
-    send<ArrivalLog::kLeftInfo, sensor_msgs::CameraInfo>(left);
-    if (has_right) send<ArrivalLog::kRightImage, sensor_msgs::Image>(right);
-    send<ArrivalLog::kRightInfo, sensor_msgs::CameraInfo>(right);
-  }
-};
-
-TEST_F(JitterTest, OfFiveHundredPairsWhoseStampsDifferEachIsUsedOrCountedAndTheSpreadIsSaid) {
-  std::mt19937 random(1);
-  std::uniform_real_distribution<double> apart(-0.004, 0.004);
-  std::string said;
-  for (int pair = 0; pair < 500; ++pair) {
-    send(pair, apart(random));
-    const std::string loss = log_.explainLoss(now);
-    if (said.empty() && !loss.empty()) {
-      said = loss;
-      EXPECT_LT(now, 3.0);
-    }
-  }
-  const std::string loss = log_.explainLoss(now);
-  expectWords(loss, {"stereo pairs in 5 s are not used", "left and", "the nearest stamps of left and right are 1.",
-                     "ms apart, more than sync_tolerance (1.0 ms): set sync_tolerance to 0.0"});
-  log_.explainLoss(now + 10.0);  // what waits for partners is given up
-  EXPECT_GT(used, 80);
-  EXPECT_LT(used, 200);
-  EXPECT_EQ(used + unpaired(), 500u);
-}
-
-TEST_F(JitterTest, LostImagesOfEitherSideAreNamed) {
-  for (int pair = 0; pair < 120; ++pair) send(pair, 0.0, true, pair % 3 != 1);
-  EXPECT_TRUE(contains(log_.explainLoss(now), "left images have no right one within half a period"))
-      << log_.explainLoss(now);
-  for (int pair = 120; pair < 240; ++pair) send(pair, 0.0, pair % 2 == 0, true);
-  EXPECT_TRUE(contains(log_.explainLoss(now), "right images have no left one within half a period"))
-      << log_.explainLoss(now);
-  log_.explainLoss(now + 10.0);
-  EXPECT_EQ(used + unpaired(), 240u);
 }
 
 }  // namespace sdvo::test_synchronisers
