@@ -287,16 +287,6 @@ TEST(FeatureExtractor, SizeCurveIsThatOfEverySizeAlsoInALowImage) {
   EXPECT_EQ(extractor.sizeCurve({640, 480}).max_size, extractor.options().sizeCurve().max_size);
 }
 
-TEST(FeatureExtractor, IsStateless) {
-  const StereoCamera camera = synthetic::camera();
-  const FeatureExtractor extractor(fewFeatures());
-  const Views first = planeAt(8.0), second = planeAt(12.0, 32);
-  const StereoFeatures before = extractor.extract(camera, first.left, first.right, 1);
-  EXPECT_NE(before.u, extractor.extract(camera, second.left, second.right, 2).u);
-  synthetic::expectEqual(before, extractor.extract(camera, first.left, first.right, 3));
-  synthetic::expectEqual(before, extract(first));
-}
-
 TEST(FeatureExtractor, LeavesItsImagesAlone) {
   const Views pair = planeAt(8.0);
   const cv::Mat left = pair.left.clone(), right = pair.right.clone();
