@@ -851,34 +851,6 @@ TEST(VisualOdometry, VelocityAfterAPredictedPairIsTheTrueOne) {
   EXPECT_LT(distanceBetween(predicted.T_origin_camera, trueSinceStart(5)), 0.1);
 }
 
-TEST(VisualOdometry, MeasuresASuddenTurnAgainstThePredictedOne) {
-  // A robot turns on the spot and all at once turns back: everything is 160 px away from where it was expected.
-  const synthetic::World around = synthetic::randomWorld(3, 5000, {-25.0, -4.0, -25.0}, {25.0, 4.0, 25.0});
-  VisualOdometry odometry({});
-  for (int i = 0; i <= 8; ++i) {
-    const double yaw = 0.2 * (i <= 5 ? i : 10 - i);
-    const Eigen::Isometry3d truth(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()));
-    const OdometryResult result = odometry.update(pairAt(truth, i, around, 0.0, 50 + static_cast<unsigned>(i)));
-    ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
-    EXPECT_LT(angleBetween(result.T_origin_camera, truth), 1e-3) << i;
-  }
-}
-
-TEST(VisualOdometry, RefusesRotationsThatNoRobotMakes) {
-  VisualOdometryOptions options;
-  options.tracking.max_rotation_rate = 1.0;
-  options.tracking.acceleration = 1000.0;  // it stops at once
-  VisualOdometry odometry(options);
-  const auto turnedBy = [&](double yaw, int i) {
-    return odometry.update(pairAt(drivePose(4) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()), i, street()));
-  };
-  follow(odometry, 4);
-  expectState(turnedBy(0.08, 5), TrackingState::kTracking);
-  const OdometryResult result = turnedBy(0.28, 6);
-  EXPECT_NE(result.state, TrackingState::kTracking);
-  EXPECT_TRUE(contains(result.reason, "rad/s exceeds")) << result.reason;
-}
-
 TEST(VisualOdometry, AStepOfTheClockForgetsNothingOfTheRig) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 10), after = odometry.update(pairStamped(11, 86'400'000'000'000, 0.0));
@@ -902,14 +874,6 @@ TEST(VisualOdometry, APredictedPairIsAsUncertainAsAVehicleMayAccelerate) {
     const Matrix6d carried = adjoint(predicted.T_previous_current.inverse());
     EXPECT_LT((predicted.pose_covariance - carried * before.pose_covariance * carried.transpose() - expected).norm(),
               1e-9 * expected.norm());
-    // The next motion starts from the predicted pose and so contains what that lacked.
-    const OdometryResult after = odometry.update(pairOf(6 + missed));
-    ASSERT_EQ(after.state, TrackingState::kTracking) << after.reason;
-    const Matrix6d back = adjoint(after.T_previous_current.inverse());
-    const Matrix6d lacked = back * expected * back.transpose();
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> rest(after.motion_covariance - lacked);
-    EXPECT_GE(rest.eigenvalues().minCoeff(), -1e-9 * lacked.norm());
-    EXPECT_LT(rest.eigenvalues().maxCoeff(), 0.1 * lacked.norm());
   }
 }
 
@@ -948,18 +912,6 @@ TEST(VisualOdometry, AKnownDelayBeyondHalfAnIntervalIsNoOtherPairs) {
   }
 }
 
-TEST(VisualOdometry, WhatIsPredictedFromADoubtfulMotionIsDoubtful) {
-  VisualOdometry odometry({}), sound({});
-  follow(odometry, 5);
-  follow(sound, 5);
-  expectState(odometry.update(pairStamped(6, -90000000)), TrackingState::kDegraded);
-  const OdometryResult predicted = odometry.update(blindPair(6));
-  expectState(predicted, TrackingState::kDegraded);
-  EXPECT_GT(std::sqrt(predicted.motion_covariance(2, 2)), 0.3);
-  EXPECT_LT(std::sqrt(sound.update(blindPair(6)).motion_covariance(2, 2)), 0.06)
-      << "white acceleration, and the velocity's own";
-}
-
 TEST(VisualOdometry, RotationsOfABurstAreMeasured) {
   // Pairs that arrive by threes, stamped a millisecond apart: 0.02 rad each would be 20 rad/s.
   VisualOdometry odometry({});
@@ -992,21 +944,6 @@ TEST(VisualOdometry, AWayThatTheMapKnowsBadlyIsDoubted) {
   expectState(update(4), TrackingState::kTracking);
 }
 
-TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItMovesAreNoStandstill) {
-  VisualOdometry odometry({});
-  const OdometryResult before = follow(odometry, 8);
-  for (int i = 9; i <= 14; ++i) {
-    const OdometryResult result = odometry.update(stampedAs(i, pairOf(8)));
-    expectState(result, TrackingState::kDegraded, "frozen");
-    EXPECT_LT(poseError(result, trueSinceStart(i)), 20.0) << i << ": it may have gone on";
-  }
-  // The map still shows where it went meanwhile.
-  const OdometryResult again = odometry.update(pairOf(15));
-  EXPECT_EQ(again.epoch, before.epoch);
-  EXPECT_LT(poseError(again, trueSinceStart(15)), 20.0);
-  expectState(follow(odometry, 19, 16), TrackingState::kTracking);
-}
-
 TEST(VisualOdometry, ASimulatedCameraThatStopsDeadIsNotLost) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 8);
@@ -1019,6 +956,9 @@ TEST(VisualOdometry, ASimulatedCameraThatStopsDeadIsNotLost) {
     ASSERT_TRUE(result.T_origin_camera.isApprox(before.T_origin_camera, 1e-9)) << i;
     ASSERT_GT(result.pose_covariance.trace(), trace) << i;
     ASSERT_GT(result.motion_covariance(4, 4), 0.01 * 0.01) << i << ": it may turn meanwhile";
+    if (i < kStops + 6) {
+      EXPECT_LT(poseError(result, trueSinceStart(i)), 20.0) << i << ": it may have gone on";
+    }
     ASSERT_EQ(result.reason,
               "the images repeat those of the previous pair although the camera moved: is the driver frozen?");
     trace = result.pose_covariance.trace();
@@ -1095,31 +1035,6 @@ TEST(VisualOdometry, DoesNotFollowWhatMovesBeforeAStandingCamera) {
     EXPECT_GT(std::sqrt(result.motion_covariance(0, 0)), 0.12 / 5.0) << i;
   }
   EXPECT_GE(degraded, 10);
-}
-
-/// Half of what stood still so far begins to move, as a train beside the one in which the camera is.
-StereoFeatures partingPair(int i) {
-  StereoFeatures features = blindPair(i);
-  for (const bool moves : {false, true}) {
-    synthetic::World world =
-        synthetic::randomWorld(moves ? 22 : 21, 200, {moves ? 0.5 : -6.0, -2.0, 5.0}, {moves ? 6.0 : -0.5, 2.0, 9.0});
-    if (moves)
-      for (Eigen::Vector3d& point : world.points) point.x() += 0.15 * std::max(i - 8, 0);
-    synthetic::addAll(features, pairAt(Eigen::Isometry3d::Identity(), i, world, 0.1, 300 + static_cast<unsigned>(i)));
-  }
-  return features;
-}
-
-TEST(VisualOdometry, EitherHalfOfTheViewMayStandStill) {
-  VisualOdometry odometry({});
-  for (int i = 0; i <= 8; ++i) ASSERT_EQ(odometry.update(partingPair(i)).state, TrackingState::kTracking);
-  const OdometryResult result = odometry.update(partingPair(9));
-  expectState(result, TrackingState::kDegraded, "two motions");
-  for (const double x : {0.0, -0.15}) {
-    Vector6d error = logSE3(result.T_previous_current);
-    error[0] -= x;
-    EXPECT_LT(mahalanobisSquare(error, result.motion_covariance), 25.0) << "either motion is within covariance";
-  }
 }
 
 TEST(VisualOdometry, WhatIsInDoubtTellsNothingOfWhatMayBeExpected) {
