@@ -787,34 +787,6 @@ TEST_F(Tools, HashTellsOptionsApart) {
   EXPECT_EQ(hashOf("stereo_features: {descriptor: {oriented: Yes}}\n"), hash("--param descriptor/oriented=true"));
 }
 
-/// A circle to the left: the camera's z points ahead and its x to the right, the base's x ahead and its z upwards.
-TEST_F(Tools, TheTwistOfTheGroundTruthIsThatOfTheBase) {
-  constexpr double kSpeed = 2.0, kTurn = 0.5;  // m/s, rad/s
-  {
-    std::ofstream poses(root_ / "circle.txt");
-    poses << std::setprecision(15);
-    for (int i = 0; i < kPairs; ++i) {
-      const double c = std::cos(0.1 * i * kTurn), s = std::sin(0.1 * i * kTurn), radius = kSpeed / kTurn;
-      poses << c << " 0 " << -s << " " << radius * (c - 1.0) << " 0 1 0 0 " << s << " 0 " << c << " " << radius * s
-            << "\n";
-    }
-  }
-  const fs::path file = root_ / "circle.bag";
-  succeed("convert", drive_ + " --poses " + in("circle.txt") + " --output " + file.string());
-  const rosbag::Bag bag(file.string());
-  rosbag::View view(bag, rosbag::TopicQuery("/ground_truth/odom"));
-  EXPECT_EQ(view.size(), static_cast<std::uint32_t>(kPairs));
-  for (const rosbag::MessageInstance& message : view) {
-    const geometry_msgs::Twist twist = message.instantiate<nav_msgs::Odometry>()->twist.twist;
-    EXPECT_NEAR(twist.linear.x, kSpeed, 1e-6);
-    EXPECT_NEAR(twist.linear.y, 0.0, 1e-6);
-    EXPECT_NEAR(twist.linear.z, 0.0, 1e-6);
-    EXPECT_NEAR(twist.angular.x, 0.0, 1e-6);
-    EXPECT_NEAR(twist.angular.y, 0.0, 1e-6);
-    EXPECT_NEAR(twist.angular.z, kTurn, 1e-6);
-  }
-}
-
 TEST_F(Tools, AnyRecordingBecomesAPage) {
   const fs::path page = root_ / "page.html";
   const std::string to_page = " --page " + page.string();
@@ -888,9 +860,6 @@ TEST_F(Tools, ThePageOfALostDriveSaysWhere) {
   darken(1, kPairs - 2);
   EXPECT_EQ(run("run_sequence", drive_ + " --page " + in("page.html")).exit_code, 2);
   expectWords(readPage(in("page.html")), {"Interrupted: ", " of 4 pairs have no pose", "LOST", "no figure"});
-}
-
-TEST_F(Tools, ThePageOfADriveWithoutAPose) {
   for (int pair = 0; pair < kPairs; ++pair)
     for (const int side : {0, 1}) darken(side, pair);
   run("run_sequence", drive_ + " --page " + in("page.html"));
