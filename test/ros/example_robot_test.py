@@ -2,10 +2,8 @@
 """The example robot, launched as a user would but without rviz, on a rendered drive whose truth is exact."""
 
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 
 import numpy as np
@@ -15,7 +13,7 @@ import rostest
 import tf2_ros
 from nav_msgs.msg import Odometry, Path
 
-from kitti_replay import PACKAGE, Collector, links, matrix_of, run_tool, wait_until
+from kitti_replay import PACKAGE, Collector, converted, links, matrix_of, run_tool, temporary_folder, wait_until
 from stereo_descriptor_vo.msg import VoInfo
 
 PAIRS = 240  # 12 s: two stretches at least and the turn on the spot between them
@@ -30,9 +28,9 @@ def launch(*arguments):
 class Drive:
     """What a bag of convert holds: the truth at each stamp, of a base whose origin is the left camera."""
 
-    def __init__(self, path):
+    def __init__(self, path, truth):
+        self.poses = {stamp: matrix_of(message.pose.pose) for stamp, message in truth.items()}
         with rosbag.Bag(path) as bag:
-            self.poses = {m.header.stamp: matrix_of(m.pose.pose) for _, m, _ in bag.read_messages('/ground_truth/odom')}
             mount = next(m for _, m, _ in bag.read_messages('/tf_static')).transforms[0]
             info = next(m for _, m, _ in bag.read_messages('/stereo/right/camera_info'))
         assert mount.child_frame_id == LEFT, mount
@@ -71,13 +69,12 @@ class Drive:
 class ExampleRobot(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.directory = tempfile.mkdtemp(prefix='sdvo_example_robot_')
-        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
-        drive, bag = os.path.join(cls.directory, 'drive'), os.path.join(cls.directory, 'drive.bag')
+        cls.directory = temporary_folder(cls)
+        drive = os.path.join(cls.directory, 'drive')
         run_tool('render_drive', '--trajectory', 'turn_in_place', '--rig', 'd435_small', '--frames', str(PAIRS), '--output',
                  drive)
-        run_tool('convert', drive, '--output', bag)
-        cls.drive = Drive(bag)
+        bag, truth = converted(drive, cls.directory)
+        cls.drive = Drive(bag, truth)
 
         cls.odometry, cls.info = Collector('/stereo/odom', Odometry), Collector('/stereo/vo_info', VoInfo)
         cls.transforms = tf2_ros.Buffer(cache_time=rospy.Duration(60))

@@ -2,21 +2,19 @@
 """The examples of subscribers, on made-up descriptors whose answers are known and on a converted sequence."""
 
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 
 import numpy as np
-import roslib.packages
 import rospy
 import rostest
 import yaml
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Float32
 
-from kitti_replay import PACKAGE, Collector, Rosout, is_connected, links, street_dir, wait_until
+from kitti_replay import (PACKAGE, Collector, Rosout, ended_by, is_connected, links, nodelet_process, run_tool, street_dir,
+                          temporary_folder, wait_until)
 from stereo_descriptor_vo.msg import StereoFeatures
 
 COUNT = 101  # odd: the median is one of them
@@ -114,8 +112,7 @@ class Examples(unittest.TestCase):
         self.assertTrue(all('StereoFeatures message refused' in error for error in rosout.errors), rosout.errors)
 
     def test_side_by_side_images_become_a_pair(self):
-        directory = tempfile.mkdtemp(prefix='sdvo_split_')
-        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
+        directory = temporary_folder(self)
         arguments = []
         for side, tx in (('left', 0.0), ('right', -50.0)):
             path = os.path.join(directory, side + ' info.yaml')
@@ -128,10 +125,8 @@ class Examples(unittest.TestCase):
                                 'rectification_matrix': matrix(3, 3, [1.0, 0, 0, 0, 1, 0, 0, 0, 1]),
                                 'projection_matrix': matrix(3, 4, [500.0, 0, 2, tx, 0, 500, 1.5, 0, 0, 0, 1, 0])}, file)
             arguments.append('_%s_camera_info:=%s' % (side, path))
-        loader = subprocess.Popen(['rosrun', 'nodelet', 'nodelet', 'load', PACKAGE + '/SideBySideSplitter', '/split/manager',
-                                   '--no-bond', '__ns:=/split', '__name:=splitter', '_frame_id:=left_optical'] + arguments)
-        self.addCleanup(loader.wait)
-        self.addCleanup(loader.terminate)
+        ended_by(self, nodelet_process('load', PACKAGE + '/SideBySideSplitter', '/split/manager', '--no-bond', '__ns:=/split',
+                                       '__name:=splitter', '_frame_id:=left_optical', *arguments))
         images = [Collector('/split/%s/image_raw' % side, Image) for side in ('left', 'right')]
         infos = [Collector('/split/%s/camera_info' % side, CameraInfo) for side in ('left', 'right')]
         for collector in images + infos:
@@ -154,13 +149,10 @@ class Examples(unittest.TestCase):
         self.assertEqual((infos[0][0].width, infos[0][0].D[0], infos[1][0].P[3]), (4, 0.1, -50.0))
 
     def test_camera_info_that_would_end_image_proc_is_kept_from_it(self):
-        loaders = [subprocess.Popen(['rosrun', 'nodelet', 'nodelet', 'load', name, '/split/manager', '--no-bond', '__ns:=/guarded',
-                                     '__name:=' + name.split('/')[1]] + remappings) for name, remappings in
-                   ((PACKAGE + '/RectifiableInfo', []),
-                    ('image_proc/rectify', ['camera_info:=rectifiable/camera_info', 'image_mono:=image_mono']))]
-        for loader in loaders:
-            self.addCleanup(loader.wait)
-            self.addCleanup(loader.terminate)
+        for name, *remappings in ((PACKAGE + '/RectifiableInfo', ),
+                                  ('image_proc/rectify', 'camera_info:=rectifiable/camera_info', 'image_mono:=image_mono')):
+            ended_by(self, nodelet_process('load', name, '/split/manager', '--no-bond', '__ns:=/guarded',
+                                           '__name:=' + name.split('/')[1], *remappings))
         images = Collector('/guarded/image_rect', Image)
         self.addCleanup(images.close)
         rosout = Rosout('/split')
@@ -194,12 +186,8 @@ class Examples(unittest.TestCase):
     def test_answers_on_a_drive(self):
         pairs = 10
         sequence = street_dir()
-        directory = tempfile.mkdtemp(prefix='sdvo_examples_')
-        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
-        bag = os.path.join(directory, 'sequence.bag')
-        converter = roslib.packages.find_node(PACKAGE, 'convert')[0]
-        subprocess.run([converter, sequence, '--frames', str(pairs), '--output', bag], check=True,
-                       stdout=subprocess.DEVNULL)
+        bag = os.path.join(temporary_folder(self), 'sequence.bag')
+        run_tool('convert', sequence, '--frames', str(pairs), '--output', bag)
         self.listen('/stereo')
         nodes = ['/stereo/stereo_vo_manager', '/stereo/descriptor_listener']
         self.assertTrue(wait_until(lambda: all(('in', '/stereo/stereo_features') in links(node) for node in nodes)))

@@ -17,7 +17,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
-from kitti_replay import EPOCH, PACKAGE, links, matrix_of
+from kitti_replay import EPOCH, PACKAGE, ended_by, links, matrix_of
 from made_up_sequence import STEP, MadeUpSequence
 from pipeline_case import PipelineCase, camera_transform
 from stereo_descriptor_vo.srv import SetPose
@@ -161,9 +161,7 @@ class FilterTest(PipelineCase):
         self.start(publish_tf='false', queue_size=100, **arguments)
         self.poses = self.collect('pose', PoseWithCovarianceStamped)
         self.resets = self.collect('set_pose', PoseWithCovarianceStamped)
-        node = subprocess.Popen(['rosrun', PACKAGE, 'filter_reset.py', '__ns:=' + self.namespace])
-        self.addCleanup(node.wait)
-        self.addCleanup(node.terminate)
+        ended_by(self, subprocess.Popen(['rosrun', PACKAGE, 'filter_reset.py', '__ns:=' + self.namespace]))
         self.until(lambda: links(self.namespace + '/filter_reset') >= {
             ('out', self.resets.subscriber.resolved_name, rospy.get_name()), ('in', self.namespace + '/pose'),
             ('in', self.namespace + '/vo_info')})

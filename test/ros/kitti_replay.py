@@ -2,19 +2,22 @@
 
 import copy
 import os
+import shutil
 import subprocess
+import tempfile
 import time
 import unittest
 import xmlrpc.client
 
 import cv2
 import numpy as np
+import rosbag
 import rosgraph
 import roslib.packages
 import rospy
 from catkin.find_in_workspaces import find_in_workspaces
 from cv_bridge import CvBridge
-from nodelet.srv import NodeletList
+from nodelet.srv import NodeletList, NodeletLoad
 from rosgraph_msgs.msg import Clock, Log
 from sensor_msgs.msg import CameraInfo, Image
 
@@ -42,6 +45,40 @@ def kitti_dir():
 def run_tool(name, *arguments):
     executable = roslib.packages.find_node(PACKAGE, name)[0]
     subprocess.run([executable] + list(arguments), check=True, stdout=subprocess.DEVNULL)
+
+
+def temporary_folder(owner):
+    """A folder that a test, or a class of tests, has until its end."""
+    directory = tempfile.mkdtemp(prefix='sdvo_')
+    (owner.addClassCleanup if isinstance(owner, type) else owner.addCleanup)(shutil.rmtree, directory, ignore_errors=True)
+    return directory
+
+
+def ended_by(test, process):
+    """A process that ends with the test at the latest."""
+    test.addCleanup(process.wait)
+    test.addCleanup(process.terminate)
+    return process
+
+
+def converted(sequence, folder):
+    """(bag of a sequence, its true odometry by stamp)."""
+    bag = os.path.join(folder, 'sequence.bag')
+    run_tool('convert', sequence, '--output', bag)
+    with rosbag.Bag(bag) as recorded:
+        return bag, {m.header.stamp: m for _, m, _ in recorded.read_messages('/ground_truth/odom')}
+
+
+def nodelet_process(*arguments):
+    """Of the nodelet package, for example a manager."""
+    return subprocess.Popen([roslib.packages.find_node('nodelet', 'nodelet')[0], *arguments])
+
+
+def load_nodelet(manager, name, type_name):
+    """Whether the manager has loaded it."""
+    load = rospy.ServiceProxy(manager + '/load_nodelet', NodeletLoad)
+    load.wait_for_service(60)
+    return load(name, type_name, [], [], [], '').success
 
 
 def street_dir():
@@ -274,6 +311,11 @@ class Rosout:
 
     def close(self):
         self.subscriber.unregister()
+
+
+def transforms_to(child, messages):
+    """All that came on /tf of a child frame."""
+    return [t for message in list(messages) for t in message.transforms if t.child_frame_id == child]
 
 
 def matrix_of(pose):

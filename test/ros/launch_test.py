@@ -12,13 +12,12 @@ import tempfile
 import time
 import unittest
 import xml.etree.ElementTree
-import xmlrpc.client
+from unittest import mock
 
 import rosbag
 import rosgraph
 import roslaunch.config
 import roslib.packages
-import rosnode
 import rospy
 import rosservice
 import rostest
@@ -27,7 +26,7 @@ from nodelet.srv import NodeletList
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from kitti_replay import PACKAGE, wait_until
+from kitti_replay import PACKAGE, ended_by, node_pid, nodelet_process, wait_until
 from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
 # Under the nodelets' names; what an argument of the launch file can set.
@@ -71,6 +70,11 @@ def parameters(**arguments):
     command = ['roslaunch', '--dump-params', PACKAGE, 'stereo_vo.launch'] + ['%s:=%s' % item for item in arguments.items()]
     dump = yaml.safe_load(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout) or {}
     return {name[len('/stereo/'):]: value for name, value in dump.items() if name.startswith('/stereo/')}
+
+
+def roslaunch_of(test, *arguments, **options):
+    """Runs until the test's end at the latest."""
+    return ended_by(test, subprocess.Popen(['roslaunch', '--wait', PACKAGE] + list(arguments), universal_newlines=True, **options))
 
 
 def refusal(*arguments):
@@ -178,18 +182,11 @@ class Launch(unittest.TestCase):
             os.chmod(python, 0o755)
             with open(config, 'w') as file:
                 file.write('visual_odometry: {map: {keyframes: 7}}')
-            path = os.environ['PATH']
-            os.environ['PATH'] = folder + ':' + path
-            try:
+            with mock.patch.dict(os.environ, PATH=folder + ':' + os.environ['PATH']):
                 self.assertEqual(parameters(config=config), {'visual_odometry/map/keyframes': 7})
-                process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'record:=/missing/drive.bag'],
-                                           stderr=subprocess.PIPE, universal_newlines=True)
-            finally:
-                os.environ['PATH'] = path
-            try:
-                self.assertIsNotNone(self.session())
-            finally:
-                process.terminate()
+                process = roslaunch_of(self, 'stereo_vo.launch', 'record:=/missing/drive.bag', stderr=subprocess.PIPE)
+            self.assertIsNotNone(self.session())
+            process.terminate()
             said = process.communicate()[1]
             self.assertIn('nothing is recorded: there is no folder /missing', said)
             self.assertNotIn('Traceback', said)
@@ -336,15 +333,11 @@ class Launch(unittest.TestCase):
         rospy.set_param(stale, False)
         rospy.set_param(other, 5)
         # Without a manager the nodelets wait: nothing is started.
-        process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'start_manager:=false', 'base_frame_id:=robot'])
-        try:
-            self.assertTrue(wait_until(lambda: rospy.get_param('/stereo/visual_odometry/base_frame_id', '') == 'robot'))
-            self.assertFalse(rospy.has_param(stale))
-            self.assertEqual(rospy.get_param(other), 5)
-        finally:
-            process.terminate()
-            process.wait()
-        rospy.delete_param('/stereo')
+        self.addCleanup(rospy.delete_param, '/stereo')
+        roslaunch_of(self, 'stereo_vo.launch', 'start_manager:=false', 'base_frame_id:=robot')
+        self.assertTrue(wait_until(lambda: rospy.get_param('/stereo/visual_odometry/base_frame_id', '') == 'robot'))
+        self.assertFalse(rospy.has_param(stale))
+        self.assertEqual(rospy.get_param(other), 5)
 
     def session(self):
         """(session, epoch) of the odometry that answers a message of ours; None where none does."""
@@ -366,45 +359,40 @@ class Launch(unittest.TestCase):
     def test_killed_loaders_and_managers_are_replaced_and_told_apart(self):
         errors, service = [], '/stereo/visual_odometry/reset'
         listener = rospy.Subscriber('/rosout', Log, lambda log: errors.append(log.msg) if log.level >= Log.ERROR else None)
-        process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'respawn:=true'])
+        self.addCleanup(listener.unregister)
+        roslaunch_of(self, 'stereo_vo.launch', 'respawn:=true')
 
         def is_offered():
             try:
                 return rosservice.get_service_node(service) is not None
             except (rosservice.ROSServiceException, rosgraph.network.ROSHandshakeException):
                 return False  # it ends while it is asked
-        try:
+        self.assertTrue(wait_until(is_offered, 60))
+        sessions = [self.session()]
+        for node in ('/stereo/visual_odometry', '/stereo/stereo_vo_manager'):
+            time.sleep(3)  # nodelet's loader does not notice a manager that dies before their bond is formed
+            errors.clear()  # that our messages have no transform
+            os.kill(node_pid(node), signal.SIGKILL)
+            self.assertTrue(wait_until(lambda: not is_offered(), 60))
             self.assertTrue(wait_until(is_offered, 60))
-            sessions = [self.session()]
-            for node in ('/stereo/visual_odometry', '/stereo/stereo_vo_manager'):
-                time.sleep(3)  # nodelet's loader does not notice a manager that dies before their bond is formed
-                uri = rosnode.get_api_uri(rosgraph.Master('/test'), node)
-                errors.clear()  # that our messages have no transform
-                os.kill(xmlrpc.client.ServerProxy(uri).getPid('/test')[2], signal.SIGKILL)
-                self.assertTrue(wait_until(lambda: not is_offered(), 60))
-                self.assertTrue(wait_until(is_offered, 60))
-                self.assertEqual(errors, [], node)
-                sessions.append(self.session())
-            # The epoch begins at zero with each, so only the session tells them apart.
-            self.assertEqual([epoch for _, epoch in sessions], [0, 0, 0])
-            self.assertEqual(len({session for session, _ in sessions}), 3)
-        finally:
-            process.terminate()
-            process.wait()
-            listener.unregister()
+            self.assertEqual(errors, [], node)
+            sessions.append(self.session())
+        # The epoch begins at zero with each, so only the session tells them apart.
+        self.assertEqual([epoch for _, epoch in sessions], [0, 0, 0])
+        self.assertEqual(len({session for session, _ in sessions}), 3)
+
+    def start_manager_of_others(self):
+        manager = nodelet_process('manager', '__name:=driver', '__ns:=/stereo')
+        self.addCleanup(manager.kill)
+        rospy.wait_for_service('/stereo/driver/list', 60)
+        return manager
 
     def test_nodelets_in_a_manager_of_others_end_with_their_loaders_or_are_replaced(self):
-        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
-        manager = subprocess.Popen([executable, 'manager', '__name:=driver', '__ns:=/stereo'])
-        self.addCleanup(manager.kill)
+        self.start_manager_of_others()
         names = rospy.ServiceProxy('/stereo/driver/list', NodeletList)
-        names.wait_for_service(60)
 
-
-        def launch(file='stereo_vo.launch', **arguments):
-            return subprocess.Popen(['roslaunch', '--wait', PACKAGE, file, 'manager:=driver', 'start_manager:=false'] +
-                                    ['%s:=%s' % item for item in arguments.items()], stderr=subprocess.PIPE,
-                                    universal_newlines=True, start_new_session=True)
+        def launch(*arguments):
+            return roslaunch_of(self, *arguments, 'manager:=driver', 'start_manager:=false', stderr=subprocess.PIPE, start_new_session=True)
 
         def kill(process):
             """With all its loaders, which say nothing any more."""
@@ -414,33 +402,26 @@ class Launch(unittest.TestCase):
                 os.killpg(int(pid), signal.SIGKILL)
             process.wait()
         mine = ['/stereo/features_image', '/stereo/stereo_features', '/stereo/visual_odometry']
-        first = launch()
+        first = launch('stereo_vo.launch')
         self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine, 60), names().nodelets)
         kill(first)
         self.assertTrue(wait_until(lambda: names().nodelets == [], 60), names().nodelets)
-        second = launch('odometry.launch', bond='false')
+        second = launch('odometry.launch', 'bond:=false')
         self.assertTrue(wait_until(lambda: names().nodelets == mine[-1:], 60), names().nodelets)
         session = self.session()
         kill(second)
-        third = launch('odometry.launch', bond='false')
-        try:
-            self.assertTrue(wait_until(lambda: self.session() not in (None, session), 60))
-            self.assertEqual(names().nodelets, mine[-1:])
-        finally:
-            third.terminate()
+        third = launch('odometry.launch', 'bond:=false')
+        self.assertTrue(wait_until(lambda: self.session() not in (None, session), 60))
+        self.assertEqual(names().nodelets, mine[-1:])
+        third.terminate()
         self.assertIn('/stereo/visual_odometry of an earlier launch is still in /stereo/driver: it is replaced',
                       third.communicate()[1])
 
     def test_the_end_and_the_halt_of_anothers_manager_are_explained(self):
-        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
-
         def expect(words, disturb):
-            manager = subprocess.Popen([executable, 'manager', '__name:=driver', '__ns:=/stereo'])
-            self.addCleanup(manager.kill)
-            rospy.wait_for_service('/stereo/driver/list', 60)
+            manager = self.start_manager_of_others()
             said = tempfile.NamedTemporaryFile()
-            process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'odometry.launch', 'manager:=driver', 'start_manager:=false'],
-                                       stderr=said, start_new_session=True)
+            process = roslaunch_of(self, 'odometry.launch', 'manager:=driver', 'start_manager:=false', stderr=said, start_new_session=True)
             disturb(manager)
             # A bond takes 10 s to break.
             self.assertTrue(wait_until(lambda: words in pathlib.Path(said.name).read_text(), 60), words)
@@ -467,15 +448,11 @@ class Launch(unittest.TestCase):
                         for name, message in (('camera_info', CameraInfo()), ('image_rect', Image())):
                             message.header.stamp = rospy.Time(10 + i)
                             bag.write('/stereo/%s/%s' % (side, name), message, message.header.stamp)
-            process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch'])
-            try:
-                rospy.wait_for_service('/stereo/visual_odometry/reset', 60)
-                # Ends with the bag, which waits for subscribers to the images.
-                play = ['timeout', '-s', 'INT', '60', 'roslaunch', PACKAGE, 'kitti.launch', 'rviz:=false', 'camera_tf:=false']
-                self.assertEqual(subprocess.run(play + ['bag:=' + path]).returncode, 0)
-            finally:
-                process.terminate()
-                process.wait()
+            roslaunch_of(self, 'stereo_vo.launch')
+            rospy.wait_for_service('/stereo/visual_odometry/reset', 60)
+            # Ends with the bag, which waits for subscribers to the images.
+            play = ['timeout', '-s', 'INT', '60', 'roslaunch', PACKAGE, 'kitti.launch', 'rviz:=false', 'camera_tf:=false']
+            self.assertEqual(subprocess.run(play + ['bag:=' + path]).returncode, 0)
 
     def test_kitti_launch_fails_for_a_bag_that_cannot_be_read(self):
         with tempfile.TemporaryDirectory() as directory:

@@ -6,31 +6,30 @@ import copy
 import itertools
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+from unittest import mock
 
 import cv2
 import numpy as np
 import roslib.packages
 import rospy
 import rostest
-import tf2_ros
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped, TransformStamped
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
-from nodelet.srv import NodeletLoad, NodeletUnload
+from nodelet.srv import NodeletUnload
 from sensor_msgs.msg import Image, Imu, PointCloud2
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import (EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, StereoSequence, links,
-                          matrix_of, wait_until)
-from pipeline_case import PipelineCase, camera_transform
+from kitti_replay import (EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, StereoSequence, ended_by, links, load_nodelet,
+                          matrix_of, nodelet_process, transforms_to, wait_until)
+from pipeline_case import PipelineCase, camera_transform, planar_transform
 from stereo_descriptor_vo.msg import FeatureFlow, PlaceInfo, StereoFeatures, VoInfo
 from stereo_descriptor_vo.srv import ResetToPose, SaveTrajectory, SetPose
 
@@ -45,25 +44,20 @@ class Live(PipelineCase):
     def test_images_are_subscribed_only_while_someone_listens(self):
         camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
         self.diagnostics = self.keep(Collector('/diagnostics', DiagnosticArray))
-        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
-        process = subprocess.Popen([executable, 'standalone', PACKAGE + '/StereoFeatures', '__ns:=' + self.namespace,
-                                    '__name:=stereo_features'])
-        try:
-            topic = node = self.namespace + '/stereo_features'
-            # By then it has started and would have told the master of a subscription.
-            self.until(lambda: 'nobody listens' in self.diagnosis('input rate', 'stereo_features').message)
-            subscribed = {name for name, nodes in rospy.get_master().getSystemState()[2][1] if node in nodes}
-            self.assertFalse({publisher.resolved_name for publisher in camera.images + camera.infos} & subscribed)
-            listener = Collector(topic, StereoFeatures)
-            self.until(lambda: camera.is_subscribed() and ('out', topic, rospy.get_name()) in links(node))
-            camera.publish(*camera.messages(0))
-            self.until(lambda: len(listener) == 1)
-            listener.close()
-            self.until(lambda: not camera.has_subscribers())
-            self.assertIsNone(process.poll())
-        finally:
-            process.terminate()
-            process.wait()
+        process = ended_by(self, nodelet_process('standalone', PACKAGE + '/StereoFeatures', '__ns:=' + self.namespace,
+                                                 '__name:=stereo_features'))
+        topic = node = self.namespace + '/stereo_features'
+        # By then it has started and would have told the master of a subscription.
+        self.until(lambda: 'nobody listens' in self.diagnosis('input rate', 'stereo_features').message)
+        subscribed = {name for name, nodes in rospy.get_master().getSystemState()[2][1] if node in nodes}
+        self.assertFalse({publisher.resolved_name for publisher in camera.images + camera.infos} & subscribed)
+        listener = Collector(topic, StereoFeatures)
+        self.until(lambda: camera.is_subscribed() and ('out', topic, rospy.get_name()) in links(node))
+        camera.publish(*camera.messages(0))
+        self.until(lambda: len(listener) == 1)
+        listener.close()
+        self.until(lambda: not camera.has_subscribers())
+        self.assertIsNone(process.poll())
 
     def test_both_nodelets_in_one_process(self):
         """Started by hand: remapped, with private parameters of either nodelet, flat or in blocks."""
@@ -427,8 +421,7 @@ class Live(PipelineCase):
 
     def test_save_trajectory(self):
         self.start()
-        directory = tempfile.mkdtemp(prefix='sdvo_live_')
-        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
+        directory = self.folder()
         path = os.path.join(directory, 'poses.txt')
         self.assertFalse(self.call('visual_odometry/save_trajectory', SaveTrajectory, path, 'tum').success)  # nothing yet
         for i in range(4):
@@ -438,11 +431,6 @@ class Live(PipelineCase):
         rows = np.loadtxt(path)
         np.testing.assert_allclose(rows[:, 0], [m.header.stamp.to_sec() for m in self.odometry])
         np.testing.assert_allclose(rows[:, 1], [m.pose.pose.position.x for m in self.odometry], atol=1e-9)
-        self.assertTrue(self.call('visual_odometry/save_trajectory', SaveTrajectory, path, 'kitti').success)
-        rows = np.loadtxt(path)
-        np.testing.assert_allclose(rows[0].reshape(3, 4), np.eye(4)[:3], atol=1e-9)
-        self.assertAlmostEqual(rows[3][11], self.odometry[3].pose.pose.position.x)  # the camera looks ahead
-        self.assertFalse(self.call('visual_odometry/save_trajectory', SaveTrajectory, '/dev/null', 'tum').success)
         others = os.path.join(directory, 'others.txt')
         with open(others, 'w') as file:
             file.write('precious')
@@ -515,40 +503,6 @@ class Live(PipelineCase):
         self.feed_messages(images, infos)
         self.until(lambda: self.rosout.warned('calibration: ', 'in pixels times mm or cm'))
 
-    def test_images_of_twelve_bits(self):
-        self.start()
-        for i in range(5):
-            images, infos = self.camera.messages(i)
-            for image, pixels in zip(images, self.sequence.pairs[i]):
-                image.encoding, image.step, image.is_bigendian = 'mono16', 2 * image.width, i % 2
-                image.data = (pixels.astype(np.uint16) * 16).astype('>u2' if i % 2 else '<u2').tobytes()
-            info = self.feed_messages(images, infos)
-            self.assertEqual(info.state, 'TRACKING')
-            self.assertGreater(info.features, 300)
-
-    def test_diagnostics_tell_state_latency_and_silence(self):
-        self.start()
-        self.until(lambda: 'no features yet' in self.diagnosis().message)
-
-        def values():
-            return {value.key: value.value for value in self.diagnosis().values}
-        for i in range(5):
-            images, infos = self.camera.messages(i)
-            self.clock.advance_to(images[0].header.stamp + rospy.Duration(10))
-            time.sleep(0.1)
-            self.feed_messages(images, infos)
-        # A reason may follow, such as a correction by the map.
-        self.until(lambda: self.diagnosis().message.startswith('TRACKING'))
-        self.assertEqual(self.diagnosis().level, DiagnosticStatus.OK)
-        self.assertGreater(float(values()['latency [s]']), 5.0)
-        self.assertTrue(0.0 < float(values()['rms reprojection error [px]']) < 1.0, values())
-        self.until(lambda: self.diagnosis('input rate').name != '')
-        # The clock stands still as it does when a bag has ended.
-        self.until(lambda: self.diagnosis().level == DiagnosticStatus.ERROR)
-        self.assertIn('no features for', self.diagnosis().message)
-        self.assertIn('TRACKING', self.diagnosis().message)
-        self.until(lambda: self.diagnosis('input rate').level == DiagnosticStatus.ERROR)
-
     def test_another_odometry_tells_of_a_motion_that_was_not_to_be_expected(self):
         self.start(config=self.config('visual_odometry: {guess_frame_id: wheels, guess_timeout: 0.5}\n'))
         for i in range(4):
@@ -558,16 +512,12 @@ class Live(PipelineCase):
         # From one pair to the next as far as in six. Nothing orders TF and images: the pair waits for it, once the rest after a
         # missing guess is over.
         time.sleep(1.0)
-        tf = self.keep(tf2_ros.TransformBroadcaster())
-        tf.close = tf.pub_tf.unregister
-        self.until(lambda: self.is_sent_to_pipeline(tf.pub_tf))
+        tf = self.tf_broadcaster()
         before, last = self.odometry[-2].pose.pose.position, self.odometry[-1].pose.pose.position
         step = np.hypot(last.x - before.x, last.y - before.y)
         images, infos = self.camera.messages(9, time_of=4)
         for stamp, x in ((self.info[-1].header.stamp, 20.0), (images[0].header.stamp, 20.0 + 6.0 * step)):
-            transform = TransformStamped()
-            transform.header.frame_id, transform.child_frame_id, transform.header.stamp = 'wheels', 'base_link', stamp
-            transform.transform.translation.x, transform.transform.rotation.w = x, 1.0
+            transform = planar_transform('wheels', 'base_link', stamp, x)
             tf.sendTransform(transform)
         info = self.feed_messages(images, infos)
         self.assertEqual(info.state, 'TRACKING', info.reason)
@@ -575,14 +525,13 @@ class Live(PipelineCase):
         self.assertAlmostEqual(np.hypot(now.x - last.x, now.y - last.y), 6.0 * step, delta=0.5)
         # TF has odom -> wheels, in which the wheels carry the base. It stays in the dark.
         all_tf = self.keep(Collector('/tf', TFMessage))
-
-        def corrections():
-            return [t for m in list(all_tf) for t in m.transforms if (t.header.frame_id, t.child_frame_id) == ('odom', 'wheels')]
         self.until(lambda: ('out', '/tf', rospy.get_name()) in links(self.pipeline.manager))
         times = itertools.count(5)
         self.until(lambda: self.feed_messages(*self.camera.dark(9, time_of=next(times))).state == 'LOST')
-        self.until(lambda: corrections() and corrections()[-1].header.stamp == self.info[-1].header.stamp)
-        T_odom_base = matrix_of(corrections()[-1].transform) @ matrix_of(transform.transform)
+        self.until(lambda: any(t.header.stamp == self.info[-1].header.stamp for t in transforms_to('wheels', all_tf)))
+        correction = transforms_to('wheels', all_tf)[-1]
+        self.assertEqual(correction.header.frame_id, 'odom')
+        T_odom_base = matrix_of(correction.transform) @ matrix_of(transform.transform)
         np.testing.assert_allclose(T_odom_base[:3, 3], [now.x, now.y, self.odometry[3].pose.pose.position.z], atol=1.0)
 
     def test_the_truth_on_tf_is_where_it_starts_and_what_errors_are_of(self):
@@ -592,14 +541,9 @@ class Live(PipelineCase):
         info = self.feed_messages(*self.camera.messages(0, time_of=next(times)))
         self.assertEqual(info.state, 'WAITING')
         self.assertIn('ground_truth_frame_id', info.reason)
-        tf = self.keep(tf2_ros.TransformBroadcaster())
-        tf.close = tf.pub_tf.unregister
-        self.until(lambda: self.is_sent_to_pipeline(tf.pub_tf))
+        tf = self.tf_broadcaster()
         for stamp in (info.header.stamp, info.header.stamp + rospy.Duration(9)):
-            marker = TransformStamped()
-            marker.header.frame_id, marker.child_frame_id, marker.header.stamp = 'world', 'marker', stamp
-            marker.transform.translation.x, marker.transform.translation.y = 10.0, 5.0
-            marker.transform.rotation.z = marker.transform.rotation.w = np.sqrt(0.5)  # looks along y
+            marker = planar_transform('world', 'marker', stamp, 10.0, 5.0, np.pi / 2)
             tf.sendTransform(marker)
         self.until(lambda: self.feed_messages(*self.camera.messages(0, time_of=next(times))).state != 'WAITING')
         np.testing.assert_allclose(matrix_of(self.odometry[0].pose.pose), matrix_of(marker.transform), atol=1e-9)
@@ -615,19 +559,15 @@ class Live(PipelineCase):
         self.clock.jump_to(rospy.Time.from_sec(EPOCH))  # tests before carried it on, and a guess must not be old
         self.start(config=self.config('visual_odometry: {guess_frame_id: wheels, guess_timeout: 0.5, guess_min_translation: 0.1}\n'))
         all_tf = self.keep(Collector('/tf', TFMessage))
-        tf = self.keep(tf2_ros.TransformBroadcaster())
-        tf.close = tf.pub_tf.unregister
-        self.until(lambda: self.is_sent_to_pipeline(tf.pub_tf) and ('out', '/tf', rospy.get_name()) in links(self.pipeline.manager))
+        tf = self.tf_broadcaster()
+        self.until(lambda: ('out', '/tf', rospy.get_name()) in links(self.pipeline.manager))
         driven, times = [0.0], itertools.count()
 
         def images(i, step=0.0):
             """Pair i at the next stamp, and where the wheels are by then."""
             messages = self.camera.messages(i, time_of=next(times))
             driven[0] += step
-            transform = TransformStamped()
-            transform.header.frame_id, transform.child_frame_id, transform.header.stamp = 'wheels', 'base_link', messages[0][0].header.stamp
-            transform.transform.translation.x, transform.transform.rotation.w = driven[0], 1.0
-            tf.sendTransform(transform)
+            tf.sendTransform(planar_transform('wheels', 'base_link', messages[0][0].header.stamp, driven[0]))
             return messages
 
         def cpu():
@@ -651,8 +591,7 @@ class Live(PipelineCase):
         self.assertLess((cpu() - used) / (time.monotonic() - begin), 0.05)  # of a processor
         self.assertEqual(len(self.info), answers)
         self.until(lambda: 'the base stands, by wheels' in self.diagnosis('input rate').message)
-        corrections = [t for m in list(all_tf) for t in m.transforms if (t.header.frame_id, t.child_frame_id) == ('odom', 'wheels')]
-        self.assertGreater(corrections[-1].header.stamp, info.header.stamp + rospy.Duration(10))
+        self.assertGreater(transforms_to('wheels', all_tf)[-1].header.stamp, info.header.stamp + rospy.Duration(10))
 
         # Off it goes: the map is where it was.
         self.until(lambda: images(4, 1.0) and self.camera.is_subscribed())
@@ -772,12 +711,8 @@ class Live(PipelineCase):
     def test_another_publisher_of_the_same_transform_is_named(self):
         self.start()
         self.feed(0)
-        tf = self.keep(tf2_ros.TransformBroadcaster())
-        tf.close = tf.pub_tf.unregister
-        transform = TransformStamped()
-        transform.header.frame_id, transform.child_frame_id = 'odom', 'base_link'
-        transform.header.stamp = self.info[0].header.stamp
-        transform.transform.rotation.w = 1.0
+        tf = self.tf_broadcaster()
+        transform = planar_transform('odom', 'base_link', self.info[0].header.stamp)
 
         def is_named():
             tf.sendTransform(transform)
@@ -806,7 +741,6 @@ class Live(PipelineCase):
 
     def test_loading_and_unloading_while_messages_come(self):
         self.start()
-        load = rospy.ServiceProxy(self.pipeline.manager + '/load_nodelet', NodeletLoad)
         unload = rospy.ServiceProxy(self.pipeline.manager + '/unload_nodelet', NodeletUnload)
         nodelets = (('stereo_features', 'StereoFeatures'), ('visual_odometry', 'VisualOdometry'),
                     ('features_image', 'FeaturesImage'))
@@ -825,7 +759,7 @@ class Live(PipelineCase):
             for _ in range(8):
                 for name, type_name in nodelets:
                     self.assertTrue(unload('%s/%s' % (self.namespace, name)).success)
-                    self.assertTrue(load('%s/%s' % (self.namespace, name), PACKAGE + '/' + type_name, [], [], [], '').success)
+                    self.assertTrue(load_nodelet(self.pipeline.manager, '%s/%s' % (self.namespace, name), PACKAGE + '/' + type_name))
                     self.assert_alive()
         finally:
             running = False
@@ -837,7 +771,6 @@ class Live(PipelineCase):
 
     def test_wrong_parameters_are_named_and_the_nodelet_is_not_loaded(self):
         self.start()
-        load = rospy.ServiceProxy(self.pipeline.manager + '/load_nodelet', NodeletLoad)
         for type_name, name, value in (('StereoFeatures', 'detector/max_features', -1),
                                        ('VisualOdometry', 'initial_pose', 'here'),
                                        ('VisualOdometry', 'odom_frame_id', '/base_link'), ('VisualOdometry', 'base_frame_id', ''),
@@ -847,7 +780,7 @@ class Live(PipelineCase):
             nodelet = '%s/wrong_%s_%s' % (self.namespace, type_name, name.replace('/', '_'))
             rospy.set_param(nodelet + '/' + name, value)
             with self.assertRaises(rospy.ServiceException):  # so nodelet says that it did not load
-                load(nodelet, PACKAGE + '/' + type_name, [], [], [], '')
+                load_nodelet(self.pipeline.manager, nodelet, PACKAGE + '/' + type_name)
             self.until(lambda: self.rosout.said('not started', str(value) if name == 'initial_pose' else name))
         self.assertEqual(self.feed(0).state, 'TRACKING')
         self.assert_alive()
@@ -914,32 +847,6 @@ class Live(PipelineCase):
         self.assertEqual((info.state, info.epoch), ('TRACKING', self.info[0].epoch))
         publisher.unregister()
 
-    def test_darkness_loses_the_odometry_and_light_brings_it_back(self):
-        self.start()
-        for i in range(4):
-            self.assertEqual(self.feed(i).state, 'TRACKING')
-        states = []
-        for i in range(4, 10):
-            images, infos = self.camera.dark(i)
-            info = self.feed_messages(images, infos)
-            states.append(info.state)
-            if info.state == 'LOST':
-                self.assertNotEqual(info.reason, '')
-        self.assertEqual(states[1:], ['LOST'] * 5)
-        self.assertIn(states[0], ('DEGRADED', 'LOST'))
-        predicted = states.count('DEGRADED')
-        self.assertEqual(len(self.odometry), 4 + predicted)  # nothing while LOST
-
-        light = [self.feed(i) for i in (10, 11, 12)]
-        self.assertIn('re-acquired', light[0].reason)
-        self.assertEqual(light[-1].state, 'TRACKING', light[-1].reason)
-        self.assertEqual({info.epoch for info in light}, {self.info[0].epoch})
-        self.assertEqual(len(self.odometry), 7 + predicted)
-        # It is where the camera is: seven steps of the street further than before.
-        positions = [matrix_of(m.pose.pose)[:3, 3] for m in self.odometry]
-        step = np.linalg.norm(positions[3] - positions[2])
-        self.assertLess(abs(np.linalg.norm(positions[4 + predicted] - positions[3]) - 7 * step), 0.2 * step)
-
     def test_rows_that_do_not_agree_are_named_once(self):
         self.start()
         for i in range(3):
@@ -971,26 +878,6 @@ class Live(PipelineCase):
         self.until(lambda: camera.is_subscribed() and other.is_connected((info, odometry, features)), 60)
         return camera, info, odometry, features
 
-    def test_two_pipelines_in_one_manager_share_nothing(self):
-        self.start()
-        other_camera, other_info, other_odometry, other_features = self.start_another(self.sequence)
-        first = [self.feed(i) for i in range(5)]
-
-        # The other one starts from its own origin and goes the same way.
-        for i in range(5):
-            other_camera.publish(*other_camera.messages(i))
-            self.until(lambda: len(other_odometry) > i and len(other_info) > i and len(other_features) > i)
-        stamps = [info.header.stamp for info in first]
-        for collector in (other_info, other_features, other_odometry):
-            self.assertEqual([message.header.stamp for message in collector], stamps)
-        self.assert_only(first + [self.feed(5)])
-        for a, b in zip(self.odometry, other_odometry):
-            self.assertEqual(a.pose, b.pose)
-        self.assertEqual(other_info[-1].epoch, first[-1].epoch)
-        self.assertEqual(other_info[-1].distance, first[-1].distance)
-        # But for one transform.
-        self.until(lambda: self.rosout.warned('another nodelet of', 'publishes odom -> base_link'))
-
     def test_two_cameras_in_one_manager(self):
         self.start()
         other_camera, other_info, other_odometry, other_features = self.start_another(self.sequence.scaled(0.75))
@@ -1007,11 +894,13 @@ class Live(PipelineCase):
         # Both saw the same way.
         self.assertGreater(self.info[-1].distance, 4.0)
         self.assertAlmostEqual(other_info[-1].distance, self.info[-1].distance, delta=0.05 * self.info[-1].distance)
+        # They share nothing but one transform.
+        self.assert_only(self.info)
+        self.until(lambda: self.rosout.warned('another nodelet of', 'publishes odom -> base_link'))
 
     def start_manager_of_others(self):
         """A manager with two threads, and two nodelets of others in it that each keep one."""
-        directory = tempfile.mkdtemp(prefix='sdvo_live_')
-        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
+        directory = self.folder()
         with open(os.path.join(directory, 'package.xml'), 'w') as file:
             file.write('<package format="2"><name>slow_nodelets</name><version>0.0.0</version><description>slow</description>'
                        '<maintainer email="a@b.org">a</maintainer><license>BSD</license><depend>nodelet</depend>'
@@ -1021,21 +910,11 @@ class Live(PipelineCase):
                        'type="slow_nodelets::SlowNodelet" base_class_type="nodelet::Nodelet"/></library>' % PACKAGE)
         manager = self.namespace + '/manager_of_others'
         rospy.set_param(manager + '/num_worker_threads', 2)
-        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
-        environment = dict(os.environ, ROS_PACKAGE_PATH=directory + ':' + os.environ['ROS_PACKAGE_PATH'])
-        process = subprocess.Popen([executable, 'manager', '__ns:=' + self.namespace, '__name:=manager_of_others'],
-                                   env=environment)
-
-        def end():
-            for name in ('slow_1', 'slow_2'):
-                rospy.set_param('%s/%s/released' % (self.namespace, name), True)
-            process.terminate()
-            process.wait()
-        self.addCleanup(end)
-        load = rospy.ServiceProxy(manager + '/load_nodelet', NodeletLoad)
-        load.wait_for_service(60)
+        with mock.patch.dict(os.environ, ROS_PACKAGE_PATH=directory + ':' + os.environ['ROS_PACKAGE_PATH']):
+            ended_by(self, nodelet_process('manager', '__ns:=' + self.namespace, '__name:=manager_of_others'))
         for name in ('slow_1', 'slow_2'):
-            self.assertTrue(load('%s/%s' % (self.namespace, name), 'slow_nodelets/Slow', [], [], [], '').success)
+            self.assertTrue(load_nodelet(manager, '%s/%s' % (self.namespace, name), 'slow_nodelets/Slow'))
+            self.addCleanup(rospy.set_param, '%s/%s/released' % (self.namespace, name), True)
         return manager
 
     def test_slow_nodelets_of_others_do_not_slow_ours(self):

@@ -9,17 +9,15 @@ import threading
 import time
 import unittest
 
-import roslib.packages
 import rospy
 import rostest
 import tf2_ros
 from dynamic_reconfigure.msg import IntParameter
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
 from nav_msgs.msg import Odometry
-from nodelet.srv import NodeletLoad
 from std_srvs.srv import Empty
 
-from kitti_replay import FRAME, PACKAGE, Camera, Collector, links, wait_until
+from kitti_replay import FRAME, PACKAGE, Camera, Collector, links, load_nodelet, nodelet_process, wait_until
 from made_up_sequence import MadeUpSequence
 from pipeline_case import camera_transform
 from stereo_descriptor_vo.srv import SaveTrajectory
@@ -40,13 +38,10 @@ class DeadMaster(unittest.TestCase):
         odometry = Collector(namespace + '/odom', Odometry)
         broadcaster = tf2_ros.StaticTransformBroadcaster()
         broadcaster.sendTransform(camera_transform(FRAME))
-        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
-        manager = subprocess.Popen([executable, 'manager', '__name:=manager', '__ns:=' + namespace])
+        manager = nodelet_process('manager', '__name:=manager', '__ns:=' + namespace)
         self.addCleanup(manager.kill)
-        load = rospy.ServiceProxy(namespace + '/manager/load_nodelet', NodeletLoad)
-        load.wait_for_service(60)
         for name, type_name in (('stereo_features', 'StereoFeatures'), ('visual_odometry', 'VisualOdometry')):
-            self.assertTrue(load('%s/%s' % (namespace, name), PACKAGE + '/' + type_name, [], [], [], '').success)
+            self.assertTrue(load_nodelet(namespace + '/manager', '%s/%s' % (namespace, name), PACKAGE + '/' + type_name))
         self.assertTrue(wait_until(lambda: camera.is_subscribed() and links(namespace + '/manager') >= {
             ('in', '/tf_static'), ('out', namespace + '/odom', rospy.get_name())}, 60))
         begin = time.time()

@@ -1,8 +1,7 @@
 """The launched pipeline with a camera that is the test itself: what the tests of its faults share."""
 
+import math
 import os
-import shutil
-import tempfile
 import unittest
 
 import dynamic_reconfigure.client
@@ -12,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 
-from kitti_replay import FRAME, Camera, Collector, Pipeline, Rosout, SimulatedClock, links, wait_until
+from kitti_replay import FRAME, Camera, Collector, Pipeline, Rosout, SimulatedClock, links, temporary_folder, wait_until
 from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
 SILENCE = 1.0  # s; a pair takes a tenth of it
@@ -25,6 +24,14 @@ def camera_transform(frame):
     transform.child_frame_id = frame
     q = transform.transform.rotation
     q.x, q.y, q.z, q.w = -0.5, 0.5, -0.5, 0.5  # optical: z forward, x right
+    return transform
+
+
+def planar_transform(parent, child, stamp, x=0.0, y=0.0, yaw=0.0):
+    transform = TransformStamped()
+    transform.header.frame_id, transform.child_frame_id, transform.header.stamp = parent, child, stamp
+    transform.transform.translation.x, transform.transform.translation.y = x, y
+    transform.transform.rotation.z, transform.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
     return transform
 
 
@@ -73,9 +80,7 @@ class PipelineCase(unittest.TestCase):
         return path
 
     def folder(self):
-        directory = tempfile.mkdtemp(prefix='sdvo_case_')
-        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
-        return directory
+        return temporary_folder(self)
 
     def call(self, name, service_type, *arguments):
         return rospy.ServiceProxy('%s/%s' % (self.namespace, name), service_type)(*arguments)
@@ -95,6 +100,13 @@ class PipelineCase(unittest.TestCase):
         self.addCleanup(publisher.unregister)
         self.until(lambda: self.is_sent_to_pipeline(publisher))
         return publisher
+
+    def tf_broadcaster(self):
+        """Of transforms that move; returns once the pipeline takes them in."""
+        tf = self.keep(tf2_ros.TransformBroadcaster())
+        tf.close = tf.pub_tf.unregister
+        self.until(lambda: self.is_sent_to_pipeline(tf.pub_tf))
+        return tf
 
     def reconfigure(self, node):
         return self.keep(dynamic_reconfigure.client.Client('%s/%s' % (self.namespace, node), timeout=60))

@@ -23,7 +23,8 @@ from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from kitti_replay import FRAME, PACKAGE, Collector, Rosout, SimulatedClock, links, matrix_of, node_pid, wait_until
+from kitti_replay import (FRAME, PACKAGE, Collector, Rosout, SimulatedClock, links, matrix_of, node_pid, temporary_folder,
+                          transforms_to, wait_until)
 from pipeline_case import camera_transform
 from stereo_descriptor_vo.msg import MapGraph, PlaceInfo, PlaceMatch, PlaceRequest, PlaceSignature, StereoFeatures, VoInfo
 from stereo_descriptor_vo.srv import GetPlace, LoadPlaces, SavePlaces
@@ -171,8 +172,7 @@ class Recognition:
 class Places(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.directory = tempfile.mkdtemp(prefix='sdvo_places_')
-        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
+        cls.directory = temporary_folder(cls)
         cls.clock, cls.ring = SimulatedClock(), Ring()
         cls.broadcaster = tf2_ros.StaticTransformBroadcaster()
         cls.broadcaster.sendTransform(camera_transform(FRAME))
@@ -194,7 +194,7 @@ class Places(unittest.TestCase):
 
     def transform(self, robot):
         """The newest T_map_odom of a robot on TF; None when there is none."""
-        found = [t for m in list(self.tf) for t in m.transforms if t.child_frame_id == robot.odom_frame]
+        found = transforms_to(robot.odom_frame, self.tf)
         return matrix_of(found[-1].transform) if found else None
 
     def settle(self, robot):

@@ -5,22 +5,19 @@ trajectory is that of the drone.
 Parameter: ~rate of the replay."""
 
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 import xmlrpc.client
 
 import numpy as np
-import rosbag
 import rosgraph
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo
 
-from kitti_replay import PACKAGE, Collector, data_dir, is_connected, matrix_of, run_tool, wait_until
+from kitti_replay import PACKAGE, Collector, converted, data_dir, is_connected, matrix_of, temporary_folder, wait_until
 from stereo_descriptor_vo.msg import VoInfo
 
 MANAGER = '/stereo/stereo_vo_manager'
@@ -40,12 +37,7 @@ class Raw(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         recording = os.path.join(data_dir('EUROC_DIR', 'MH_01_moving'), 'MH_01_moving', 'mav0')
-        cls.directory = tempfile.mkdtemp(prefix='sdvo_raw_')
-        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
-        bag = os.path.join(cls.directory, 'raw.bag')
-        run_tool('convert', recording, '--output', bag)
-        with rosbag.Bag(bag) as recorded:
-            cls.truth = {m.header.stamp: m for _, m, _ in recorded.read_messages('/ground_truth/odom')}
+        bag, cls.truth = converted(recording, temporary_folder(cls))
         cls.stamps = sorted(cls.truth)
 
         cls.odometry = Collector('/stereo/odom', Odometry)

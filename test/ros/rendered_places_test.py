@@ -3,19 +3,16 @@
 recognised, and nowhere else. Needs no data set."""
 
 import os
-import shutil
 import sys
-import tempfile
 import unittest
 
 import numpy as np
-import rosbag
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import PACKAGE, Collector, is_connected, matrix_of, play, run_tool, wait_until
+from kitti_replay import PACKAGE, Collector, converted, is_connected, matrix_of, play, run_tool, temporary_folder, wait_until
 from rendered_test import CALIBRATION, SIZE
 from stereo_descriptor_vo.msg import PlaceInfo
 
@@ -25,15 +22,12 @@ RATE, PAIRS = 4.0, 215  # Hz; a lap takes 50.3 s
 class RenderedPlaces(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.directory = tempfile.mkdtemp(prefix='sdvo_rendered_places_')
-        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
-        drive = os.path.join(cls.directory, 'drive')
+        folder = temporary_folder(cls)
+        drive = os.path.join(folder, 'drive')
         run_tool('render_drive', '--trajectory', 'figure_eight', '--rate', str(RATE), '--frames', str(PAIRS), '--calib', CALIBRATION,
                  '--size', SIZE, '--output', drive)
-        bag = os.path.join(cls.directory, 'drive.bag')
-        run_tool('convert', drive, '--output', bag)
-        with rosbag.Bag(bag) as recorded:
-            cls.truth = {m.header.stamp: matrix_of(m.pose.pose) for _, m, _ in recorded.read_messages('/ground_truth/odom')}
+        bag, truth = converted(drive, folder)
+        cls.truth = {stamp: matrix_of(message.pose.pose) for stamp, message in truth.items()}
 
         cls.odometry, cls.info = Collector('/stereo/odom', Odometry), Collector('/stereo/place_info', PlaceInfo)
         cls.tf = Collector('/tf', TFMessage)

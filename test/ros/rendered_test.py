@@ -5,18 +5,15 @@ comes out with the exact ground truth. Needs no data set.
 Parameter: ~rate of the replay."""
 
 import os
-import shutil
 import sys
-import tempfile
 import unittest
 
 import numpy as np
-import rosbag
 import rospy
 import rostest
 from nav_msgs.msg import Odometry, Path
 
-from kitti_replay import PACKAGE, Collector, is_connected, matrix_of, play, run_tool, wait_until
+from kitti_replay import PACKAGE, Collector, converted, is_connected, matrix_of, play, run_tool, temporary_folder, wait_until
 from stereo_descriptor_vo.msg import VoInfo
 
 RATE = 10.0  # Hz
@@ -50,17 +47,12 @@ def planned_drive():
 class RenderedDrive(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.directory = tempfile.mkdtemp(prefix='sdvo_rendered_')
-        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
-        drive = os.path.join(cls.directory, 'drive')
-        poses = os.path.join(cls.directory, 'plan.txt')
+        folder = temporary_folder(cls)
+        drive, poses = os.path.join(folder, 'drive'), os.path.join(folder, 'plan.txt')
         np.savetxt(poses, planned_drive().reshape(-1, 12))
         run_tool('render_drive', '--trajectory', poses, '--rate', str(RATE), '--calib', CALIBRATION, '--size', SIZE,
                  '--output', drive)
-        bag = os.path.join(cls.directory, 'drive.bag')
-        run_tool('convert', drive, '--output', bag)
-        with rosbag.Bag(bag) as recorded:
-            cls.truth = {m.header.stamp: m for _, m, _ in recorded.read_messages('/ground_truth/odom')}
+        bag, cls.truth = converted(drive, folder)
         cls.stamps = sorted(cls.truth)
 
         cls.odometry = Collector('/stereo/odom', Odometry)

