@@ -88,18 +88,4 @@ TEST(RenderedOdometry, MotionsAndPosesLieInTheirCovariancesAndTheRigIsCalibrated
   EXPECT_LE(mean(motions_of_off), 25.0);
 }
 
-TEST(RenderedOdometry, TheNumberOfThreadsChangesNoBit) {
-  const Drive drive = renderDrive(4, render::RenderOptions{});
-  std::vector<Eigen::Matrix4d> poses[2];
-  const int usual = cv::getNumThreads();
-  for (const int run : {0, 1}) {
-    cv::setNumThreads(run == 0 ? 4 : 1);
-    VisualOdometry odometry{VisualOdometryOptions{}};
-    for (const StereoFeatures& features : extractAll(drive))
-      poses[run].push_back(odometry.update(features).T_origin_camera.matrix());
-  }
-  cv::setNumThreads(usual);
-  for (std::size_t k = 0; k < poses[0].size(); ++k) EXPECT_EQ(poses[0][k], poses[1][k]) << "pair " << k;
-}
-
 }  // namespace sdvo::test_rendered_odometry
