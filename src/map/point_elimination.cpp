@@ -5,7 +5,6 @@
 #include <cstddef>
 
 #include "../common/kernel.hpp"
-#include "../motion/motion_refinement.hpp"
 #include "map_point.hpp"
 
 namespace sdvo {
@@ -189,9 +188,9 @@ struct SumGradients {
 
 /// PoseEquations::add() as a kernel.
 struct AddPoint {
-  SDVO_IN_KERNEL static void run(const WindowProjection* projection, const ObservedPoint* point, double damping,
-                                 PoseEquations* equations, PoseFactor* factors, double* squares,
-                                 EliminatedPoint* result) {
+  SDVO_IN_KERNEL static void run(const WindowProjection* projection, const ObservedPoint* point,
+                                 const Linearisation* linearisation, PoseEquations* equations, PoseFactor* factors,
+                                 double* squares, EliminatedPoint* result) {
     constexpr double kLeastInformation = 1e-9;  // keeps H invertible if no observation constrains a direction
     const double rho = point->ray_and_inverse_depth.z();
     // With poses x, the point p and the calibration c, the equations have the blocks H_xx, H_xp, H_pp and so on.
@@ -205,7 +204,7 @@ struct AddPoint {
       const WindowResidual at(*projection, *point, seen);
       squares[i] = at.square;
       if (!at.isInFront()) continue;
-      const double w = cauchyWeight(at.square), root = std::sqrt(w);
+      const double w = linearisation->bend / (linearisation->bend + at.square), root = std::sqrt(w);
       const WeightedJacobians J(*projection, rho, at, point->T_camera_anchor[seen.frame], root);
       const double residual[3] = {root * at.value[0], root * at.value[1], root * at.value[2]};
       double shape[kLanes] = {};  // changes disparities alone
@@ -242,7 +241,7 @@ struct AddPoint {
     // 2. Factor H_pp, damped: R = L^-1. `reduced` is R g_p.
     const double baseline = projection->camera.baseline;
     const double least[3] = {kLeastInformation, kLeastInformation, kLeastInformation * baseline * baseline};
-    for (int k = 0; k < 3; ++k) H[k][k] = H[k][k] * (1.0 + damping) + least[k];
+    for (int k = 0; k < 3; ++k) H[k][k] = H[k][k] * (1.0 + linearisation->damping) + least[k];
     double R[3][3];
     invertRoot(H, least, R);
     const double transposed[3][kLanes] = {{R[0][0], R[1][0], R[2][0]}, {0.0, R[1][1], R[2][1]}, {0.0, 0.0, R[2][2]}};
@@ -322,10 +321,10 @@ void PoseEquations::setZero(int poses) {
   gradient_.setZero(6 * poses + kCalibration);
 }
 
-EliminatedPoint PoseEquations::add(const WindowProjection& projection, const ObservedPoint& point, double damping,
-                                   PoseFactor* factors, double* squares) {
+EliminatedPoint PoseEquations::add(const WindowProjection& projection, const ObservedPoint& point,
+                                   const Linearisation& linearisation, PoseFactor* factors, double* squares) {
   EliminatedPoint result;
-  runKernel<AddPoint>(&projection, &point, damping, this, factors, squares, &result);
+  runKernel<AddPoint>(&projection, &point, &linearisation, this, factors, squares, &result);
   return result;
 }
 
@@ -338,7 +337,8 @@ void PoseEquations::writeHessian(Eigen::MatrixXd& hessian) const {
       hessian.block<6, 6>(6 * row, 6 * column) = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(block->values);
   for (Eigen::Index pose = 0; pose < poses; ++pose)
     hessian.block<kCalibration, 6>(6 * poses, 6 * pose) =
-        Eigen::Map<const Eigen::Matrix<double, 4, 6>>(of_both_[pose].values).topRows<kCalibration>();
+        Eigen::Map<const Eigen::Matrix<double, 4, 6>>(of_both_[static_cast<std::size_t>(pose)].values)
+            .topRows<kCalibration>();
   hessian.bottomRightCorner<kCalibration, kCalibration>() = of_calibration_;
 }
 

@@ -60,6 +60,12 @@ struct EliminatedPoint {
   Eigen::Vector3d disparity_by_point;  ///< derivatives of the predicted disparities, normalised
 };
 
+/// A residual's square s costs bend * log(1 + s / bend) and weighs 1 / (1 + s / bend) in the normal equations.
+struct Linearisation {
+  double bend;
+  double damping = 0.0;  ///< fraction of its diagonal that is added to a point's H
+};
+
 /// Back-substitution: moves points (ray and inverse depth) to their optimum after a step of poses and calibration. The
 /// step has six numbers (m, rad) for each pose that may move, the calibration's is in px. `factors`: sorted by point.
 void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<PoseFactor>& factors,
@@ -75,11 +81,11 @@ class PoseEquations {
  public:
   void setZero(int poses);
 
-  /// Adds a point's observations, weighted by Cauchy's kernel, with the point eliminated (Schur complement). `damping`:
-  /// fraction of its diagonal that is added to the point's H. Writes a factor for each observation from a pose that may
-  /// move, and the same squares as squareResiduals(). Observations are in the order of their frames.
-  EliminatedPoint add(const WindowProjection& projection, const ObservedPoint& point, double damping,
-                      PoseFactor* factors, double* squares);
+  /// Adds a point's observations with the point eliminated (Schur complement). Writes a factor for each observation
+  /// from a pose that may move, and the same squares as squareResiduals(). Observations are in the order of their
+  /// frames.
+  EliminatedPoint add(const WindowProjection& projection, const ObservedPoint& point,
+                      const Linearisation& linearisation, PoseFactor* factors, double* squares);
 
   /// The lower triangle of the matrix: the poses by their left perturbations (m, rad), then the calibration.
   void writeHessian(Eigen::MatrixXd& hessian) const;
@@ -95,7 +101,9 @@ class PoseEquations {
     double values[6 * 4];
   };
 
-  double* ofPoses(int row, int column) { return of_poses_[row * (row + 1) / 2 + column].values; }
+  double* ofPoses(int row, int column) {
+    return of_poses_[static_cast<std::size_t>(row * (row + 1) / 2 + column)].values;
+  }
 
   std::vector<PoseBlock> of_poses_;        ///< lower triangle, row by row
   std::vector<CalibrationBlock> of_both_;  ///< calibration and each pose

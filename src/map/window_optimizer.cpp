@@ -24,30 +24,47 @@ std::optional<double> commonSquare(const EliminatedPoint& point) {
   return mean * mean / (1.0 - followed);
 }
 
+/// Variance of a normal distribution by the median of its squares; none if they are too few. Reorders them.
+std::optional<double> varianceOf(std::vector<double>& squares) {
+  constexpr double kMedianOfChiSquare = 0.4549;  // of one degree of freedom
+  if (squares.size() < kFewestMeasured) return std::nullopt;
+  return median(squares) / kMedianOfChiSquare;
+}
+
 }  // namespace
 
 /// Optimises one window after the other in the same memory.
 class WindowOptimizer::Solver {
  public:
-  explicit Solver(const NoiseOptions& noise) : noise_(noise) {}
+  explicit Solver(const WindowOptimizerOptions& options) : options_(options) {}
 
   const WindowSolution& optimize(Window& window, const std::vector<int>& covariance_of) {
     constexpr double kUndamped = 1e-5, kLargestDamping = 1e4;
     take(window);
+    solution_.success = false;
+    solution_.iterations = 0;
+    double damping = kUndamped, damping_of_system = kUndamped;
     bool accepted = false;
-    int tries = 0;
     // A step that increases the cost is tried again with more damping.
-    for (double damping = kUndamped; !accepted && damping < kLargestDamping; damping *= 100.0, ++tries) {
+    while (solution_.iterations < options_.iterations && damping < kLargestDamping) {
       linearise(damping);
+      damping_of_system = damping;
       const std::optional<double> next_cost = tryStep(damping);
       accepted = next_cost && *next_cost <= cost_;
+      if (!accepted) {
+        damping *= 100.0;
+        continue;
+      }
+      ++solution_.iterations;
+      std::swap(estimate_, next_);
+      damping = std::max(0.1 * damping, 1e-8);
+      if (cost_ - *next_cost < 1e-4 * (cost_ + 1.0)) break;
     }
-    if (accepted) std::swap(estimate_, next_);
     give(window);
 
-    // The linearisation before the step is used: this saves half of the work. But damping counts as information about
-    // the points, so after a second try the system is computed again, where the step led.
-    if (tries > 1) linearise(kUndamped);
+    // The last linearisation, one step before the result, is used: this saves half of the work. But damping counts as
+    // information about the points, so a damped system is computed again.
+    if (damping_of_system > kUndamped) linearise(kUndamped);
     solution_.common_disparity_square = commonVariance();
     if (!accepted) cost(estimate_, squares_);  // they are those of a refused step
     solution_.success = covariances(covariance_of);
@@ -67,14 +84,14 @@ class WindowOptimizer::Solver {
   /// Starts with a window, which must stay valid; its values become the first estimate.
   void take(const Window& window) {
     window_ = &window;
-    common_sigma_ = window.calibration_prior.common_sigma.value_or(noise_.common_disparity);
+    common_sigma_ = window.calibration_prior.common_sigma.value_or(options_.noise.common_disparity);
     const auto& observations = window.observations;
     first_of_point_.clear();
     anchors_.clear(), anchor_of_point_.clear(), estimate_.points.clear();
     for (std::size_t i = 0; i < observations.size(); ++i) {
       if (i > 0 && observations[i].point == observations[i - 1].point) continue;
       first_of_point_.push_back(static_cast<int>(i));
-      const AnchoredPoint& point = window.points[observations[i].point];
+      const AnchoredPoint& point = window.points[static_cast<std::size_t>(observations[i].point)];
       // Points with the same anchor follow each other.
       if (anchors_.empty() || point.T_origin_anchor.matrix() != anchors_.back().matrix())
         anchors_.push_back(point.T_origin_anchor);
@@ -92,10 +109,14 @@ class WindowOptimizer::Solver {
     window.T_camera_origin = estimate_.T_camera_origin;
     window.calibration = estimate_.calibration;
     for (std::size_t p = 0; p < estimate_.points.size(); ++p) {
-      const WindowObservation& first = window.observations[first_of_point_[p]];
-      window.points[first.point].ray_and_inverse_depth = estimate_.points[p];
+      const WindowObservation& first = window.observations[static_cast<std::size_t>(first_of_point_[p])];
+      window.points[static_cast<std::size_t>(first.point)].ray_and_inverse_depth = estimate_.points[p];
     }
   }
+
+  /// Square of the Cauchy kernel's scale k: a square s costs k^2 log(1 + s / k^2).
+  double kernelSquare() const { return options_.kernel_scale * options_.kernel_scale; }
+  double weight(double square) const { return kernelSquare() / (kernelSquare() + square); }
 
   /// The cost of an estimate. Also writes the square of each observation's residual.
   double cost(const Estimate& estimate, std::vector<double>& squares) {
@@ -117,7 +138,7 @@ class WindowOptimizer::Solver {
     placeAnchors(estimate_);
     PoseFactor* factors = factors_.data();
     for (std::size_t p = 0; p < points_.size(); ++p) {
-      points_[p] = equations_.add(projection, observedPoint(estimate_, p), damping, factors,
+      points_[p] = equations_.add(projection, observedPoint(estimate_, p), {kernelSquare(), damping}, factors,
                                   linearised_squares_.data() + first_of_point_[p]);
       factors += points_[p].factors;
     }
@@ -160,7 +181,6 @@ class WindowOptimizer::Solver {
 
   /// Variance, px^2, of the error that all disparities of one point share.
   std::optional<double> commonVariance() {
-    constexpr double kMedianOfChiSquare = 0.4549;  // of one degree of freedom
     double of_means = 0.0;  // variance of a point's mean disparity by the noise that is independent in each
     common_squares_.clear();
     for (std::size_t p = 0; p < points_.size(); ++p) {
@@ -168,10 +188,11 @@ class WindowOptimizer::Solver {
       const auto square = commonSquare(points_[p]);
       if (!square) continue;
       common_squares_.push_back(disparityVariance(observations) * *square);
-      of_means += noise_.disparity * noise_.disparity / observations;
+      of_means += options_.noise.disparity * options_.noise.disparity / observations;
     }
-    if (common_squares_.size() < kFewestMeasured) return std::nullopt;
-    return median(common_squares_) / kMedianOfChiSquare - of_means / static_cast<double>(common_squares_.size());
+    const auto variance = varianceOf(common_squares_);
+    if (!variance) return std::nullopt;
+    return *variance - of_means / static_cast<double>(common_squares_.size());
   }
 
   /// Sandwich covariance of an M-estimator (Huber 1967, White 1980): A^-1 B A^-1. The bread A is the cost's second
@@ -195,7 +216,7 @@ class WindowOptimizer::Solver {
     // Columns of the inverse: those of the poses that are asked for, and the calibration's.
     const int asked = 6 * static_cast<int>(poses.size());
     units_.setZero(size, asked + kCalibration);
-    for (int k = 0; k < asked; ++k) units_(6 * (poses[k / 6] - 1) + k % 6, k) = 1.0;
+    for (int k = 0; k < asked; ++k) units_(6 * (poses[static_cast<std::size_t>(k / 6)] - 1) + k % 6, k) = 1.0;
     units_.bottomRightCorner<kCalibration, kCalibration>().setIdentity();
     solved_ = factor_.solve(units_);
     const RigCalibration::Matrix of_calibration = solved_.bottomRightCorner<kCalibration, kCalibration>();
@@ -228,8 +249,7 @@ class WindowOptimizer::Solver {
     for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
       double sum_w = 0.0, sum_w2 = 0.0, sum_w4 = 0.0, sum_now2 = 0.0, sum_now4 = 0.0;
       for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
-        const double w = cauchyWeight(linearised_squares_[i]), w2 = w * w;
-        const double w_now = cauchyWeight(squares_[i]), now2 = w_now * w_now;
+        const double w = weight(linearised_squares_[i]), w2 = w * w, w_now = weight(squares_[i]), now2 = w_now * w_now;
         sum_w += w, sum_w2 += w2, sum_w4 += w2 * w2, sum_now2 += now2, sum_now4 += now2 * now2;
       }
       weights += sum_w - sum_w2 / sum_w;
@@ -302,9 +322,10 @@ class WindowOptimizer::Solver {
 
   double costOf(const Estimate& estimate, const std::vector<double>& squares) const {
     CauchyCost costs;
-    for (const double square : squares) costs.add(square);
+    for (const double square : squares) costs.add(square / kernelSquare());
     const RigCalibration::Vector error = estimate.calibration.value - window_->calibration_prior.mean;
-    return error.dot(window_->calibration_prior.information * error) + costs.value() + floorCost(estimate);
+    return error.dot(window_->calibration_prior.information * error) + kernelSquare() * costs.value() +
+           floorCost(estimate);
   }
 
   double floorCost(const Estimate& estimate) const {
@@ -317,10 +338,10 @@ class WindowOptimizer::Solver {
   /// Variance of each of n disparities of a point. Their mean has the variance sigma^2 / n + common^2, because the
   /// error that they share does not average out. With n times this for each, independent noise gives the same mean.
   double disparityVariance(int observations) const {
-    return noise_.disparity * noise_.disparity + observations * common_sigma_ * common_sigma_;
+    return options_.noise.disparity * options_.noise.disparity + observations * common_sigma_ * common_sigma_;
   }
 
-  NoiseOptions noise_;
+  WindowOptimizerOptions options_;
 
   const Window* window_ = nullptr;
   double common_sigma_ = 0.0;
@@ -353,7 +374,7 @@ class WindowOptimizer::Solver {
   WindowSolution solution_;
 };
 
-WindowOptimizer::WindowOptimizer(const NoiseOptions& noise) : solver_(std::make_unique<Solver>(noise)) {}
+WindowOptimizer::WindowOptimizer(const WindowOptimizerOptions& options) : solver_(std::make_unique<Solver>(options)) {}
 
 WindowOptimizer::WindowOptimizer(WindowOptimizer&&) noexcept = default;
 WindowOptimizer& WindowOptimizer::operator=(WindowOptimizer&&) noexcept = default;

@@ -30,9 +30,16 @@ struct Window {
   std::optional<Floor> floor;  ///< constrains the base of every pose but the first
 };
 
+struct WindowOptimizerOptions {
+  NoiseOptions noise = {};
+  int iterations = 1;         ///< most accepted Levenberg-Marquardt steps for each pair
+  double kernel_scale = 1.0;  ///< sigma: normalised residual that has half the weight
+};
+
 /// Results besides the window's new values.
 struct WindowSolution {
   bool success = false;
+  int iterations = 0;                   ///< accepted steps
   Eigen::MatrixXd pose_covariance;      ///< of the left perturbations of the poses asked for, 6 rows each, m and rad
   Eigen::MatrixXd pose_by_calibration;  ///< derivatives of these perturbations by the calibration, m/px and rad/px
   RigCalibration::Matrix calibration_information;  ///< of this window alone, the prior excluded, 1/px^2
@@ -42,12 +49,11 @@ struct WindowSolution {
   std::vector<double> squares;  ///< of each observation's normalised residual
 };
 
-/// Bundle adjustment of windows: poses, points and the rig's calibration, by one accepted Levenberg-Marquardt step for
-/// each pair, with the points eliminated first (Schur complement) and Cauchy's kernel at one standard deviation.
-/// Deterministic: windows share its memory, some megabytes, and nothing else.
+/// Bundle adjustment of windows: poses, points and the rig's calibration, by Levenberg-Marquardt with the points
+/// eliminated first (Schur complement). Deterministic: windows share its memory, some megabytes, and nothing else.
 class WindowOptimizer {
  public:
-  explicit WindowOptimizer(const NoiseOptions& noise);
+  explicit WindowOptimizer(const WindowOptimizerOptions& options);
   WindowOptimizer(WindowOptimizer&&) noexcept;
   WindowOptimizer& operator=(WindowOptimizer&&) noexcept;
   ~WindowOptimizer();

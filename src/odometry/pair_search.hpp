@@ -16,7 +16,7 @@ namespace sdvo {
 /// Searches and adjustment with the odometry's options. They remember nothing of a pair.
 struct OdometryTools {
   explicit OdometryTools(const VisualOdometryOptions& options)
-      : motions(options.motion), places(options.motion), revisit(options.motion), optimizer(options.noise) {}
+      : motions(options.motion), places(options.motion), revisit(options.motion), optimizer({options.noise}) {}
 
   MotionSearch motions;  ///< near a prediction
   Reacquisition places;  ///< after an outage

@@ -35,7 +35,7 @@ void see(LocalMap& map, const StereoFeatures& features, int id, const Eigen::Iso
 TEST(LocalMap, APairThatSharesHardlyAnythingWithTheOthersIsNotAdjusted) {
   SyntheticScene scene(3, 3000, 120.0);
   LocalMap map{LocalMapOptions()};
-  WindowOptimizer optimizer{NoiseOptions()};
+  WindowOptimizer optimizer{WindowOptimizerOptions()};
   const CalibrationBelief prior = CalibrationFilter(CalibrationOptions()).prior(RigEstimate::Shape::Identity());
   const auto isAdjusted = [&](int id, std::size_t recognised) {
     RigCalibration calibration;
@@ -306,7 +306,7 @@ TEST(LocalMap, MovesTheNewestPairToWhereItsFeaturesAreNow) {
   const std::vector<Eigen::Vector3d> positions = map.positions(), all = expected.positions();
   ASSERT_EQ(positions.size(), all.size());
   for (std::size_t i = 0; i < all.size(); ++i) EXPECT_LT((positions[i] - all[i]).norm(), 1e-6 * all[i].norm());
-  WindowOptimizer optimizer{NoiseOptions()};
+  WindowOptimizer optimizer{WindowOptimizerOptions()};
   RigCalibration calibration;
   for (LocalMap* each : {&map, &expected}) ASSERT_TRUE(each->adjust(optimizer, {}, calibration).success);
   EXPECT_TRUE(map.newestPose().isApprox(expected.newestPose(), 1e-6));
@@ -557,7 +557,7 @@ CalibrationBelief noRigError() {
 
 LocalMap::Adjustment adjusted(LocalMap& map) {
   RigCalibration calibration;
-  WindowOptimizer optimizer{NoiseOptions()};
+  WindowOptimizer optimizer({{}, 20});
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   EXPECT_TRUE(adjustment.success);
   EXPECT_LT(calibration.value.norm(), 1e-6);
@@ -634,7 +634,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   options.noise.corner = 0.05;
   NoiseOptions noise;
   noise.common_disparity = 0.0;
-  WindowOptimizer optimizer(noise);
+  WindowOptimizer optimizer({noise});
   RigCalibration calibration;
   constexpr double kNoise = 0.05;  // px
   const StereoFeatures of_second = see(world, 0, 40, second, kNoise, 2), of_third = see(world, 0, 40, third, kNoise, 3);
@@ -682,7 +682,7 @@ TEST(LocalMap, APoseErrsByWhatItsCovarianceSaysAfterManyKeyframesOfTheSamePoints
   options.noise.corner = kNoise;
   options.noise.disparity = std::sqrt(2.0) * kNoise;
   options.noise.common_disparity = 0.0;
-  WindowOptimizer optimizer(options.noise);
+  WindowOptimizer optimizer({options.noise, 20});
   double nees = 0.0;
   for (unsigned trial = 0; trial < kTrials; ++trial) {
     const synthetic::World world = someWorld(80, trial);

@@ -10,6 +10,7 @@
 namespace sdvo::test_point_elimination {
 
 constexpr double kDamping = 1e-3;
+constexpr Linearisation kLinearisation = {2.0, kDamping};
 constexpr double kLeastInformation = 1e-9;  // that a point is given of itself
 constexpr double kDisparitySigma = 0.25;    // px
 constexpr int kPoses = 4;                   // that may move
@@ -103,7 +104,7 @@ struct Row {
   double weight, square;
 };
 
-std::vector<Row> rowsOf(const Scene& scene) {
+std::vector<Row> rowsOf(const Scene& scene, double bend = kLinearisation.bend) {
   std::vector<Row> rows;
   for (const WindowObservation& seen : scene.observations) {
     const Eigen::Isometry3d& T = scene.T_camera_origin[seen.frame];
@@ -116,7 +117,7 @@ std::vector<Row> rowsOf(const Scene& scene) {
     Row row;
     row.residual = noise.cwiseProduct(measured - *prediction);
     row.square = row.residual.squaredNorm();
-    row.weight = 1.0 / (1.0 + row.square);
+    row.weight = 1.0 / (1.0 + row.square / bend);
     row.jacobian.setZero(3, 6 * kPoses + kCalibration + 3);
     if (seen.frame > 0) row.jacobian.middleCols<6>(6 * (seen.frame - 1)) = jacobians.pose;
     row.jacobian.row(2).segment<kCalibration>(6 * kPoses) =
@@ -154,8 +155,8 @@ struct Reduced {
 
   explicit Reduced(const Scene& scene) : factors(scene.observations.size()), squares(scene.observations.size()) {
     equations.setZero(kPoses);
-    point =
-        equations.add({scene.camera, scene.calibration}, scene.observed(), kDamping, factors.data(), squares.data());
+    point = equations.add({scene.camera, scene.calibration}, scene.observed(), kLinearisation, factors.data(),
+                          squares.data());
     equations.writeHessian(hessian);
     gradient = equations.gradient();
   }
@@ -277,7 +278,8 @@ TEST(PointElimination, PointsAddUp) {
   std::vector<PoseFactor> factors(4);
   std::vector<double> squares(4);
   for (const Scene* scene : {&one, &other})
-    equations.add({scene->camera, scene->calibration}, scene->observed(), kDamping, factors.data(), squares.data());
+    equations.add({scene->camera, scene->calibration}, scene->observed(), kLinearisation, factors.data(),
+                  squares.data());
   const Reduced alone(one), other_alone(other);
   Eigen::MatrixXd hessian;
   equations.writeHessian(hessian);
