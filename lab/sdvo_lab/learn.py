@@ -3,7 +3,7 @@
     lab/run learn freak-pairs                         # FREAK's bit pairs: src/front_end/freak_pairs.inc
     lab/run learn size-curve --output FILE ARGUMENT … # one run of learn size-curve, with its arguments
 
-Trajectories, rigs and seeds were named before the first run, and no table has them."""
+No table has these seeds."""
 from . import drives, programs
 
 PASSES_ON = True  # what it does not know are arguments of the program
@@ -22,15 +22,17 @@ DUSK = {("street", 1): [("straight", "kitti", 8861), ("figure_eight", "kitti", 8
         ("corridor", 0.5): [("corridor", "zed_mini", 8881), ("corridor", "euroc", 8882)],
         ("desk", 0.5): [("desk", "zed_mini", 8883), ("desk", "oak_d", 8884)]}
 EFFECTS = {"noise": 2, "exposure": 0.3}
-# Drives that sizes are chosen on.
-SIZED = [("city_loop", "kitti", 8851), ("figure_eight", "kitti", 8852), ("hand_held", "d435_small", 8853), ("hand_held", "zed_mini", 8854)]
+# Drives that sizes are chosen on, from where the camera is under way: trajectory, rig, seed, first pose.
+SIZED = [("city_loop", "kitti", 8851, 100), ("figure_eight", "kitti", 8852, 50), ("hand_held", "d435_small", 8853, 40),
+         ("hand_held", "zed_mini", 8854, 40)]
 
 
 def render(folder, chosen, pairs, **options):
     """Directories, in the order of their names."""
     def one(drive):
-        trajectory, rig, seed = drive
-        return drives.rendered(folder, trajectory, rig, seed, 0, pairs, name=f"{trajectory}_{rig}_{seed}", threads=1, **options).directory
+        trajectory, rig, seed, *start = drive
+        name = f"{trajectory}_{rig}_{seed}"
+        return drives.rendered(folder, trajectory, rig, seed, *(start or [0]), pairs, name=name, threads=1, **options).directory
 
     with programs.pool() as pool:
         return sorted(pool.map(one, chosen))
@@ -46,7 +48,7 @@ def learn_freak_pairs(folder, rest):
 
 
 def choose_size_curve(folder, rest):
-    directories = render(folder, SIZED, 15, **EFFECTS)
+    directories = render(folder, SIZED, 21, **EFFECTS)
     print(programs.run("learn", "size-curve", "--sequence", ",".join(map(str, directories)), *rest))
 
 
