@@ -172,14 +172,15 @@ StampUnit unitOf(const std::vector<std::string>& stamps, const std::string& head
   for (const StampUnit& unit : units)
     if (head.find(std::string("[") + unit.name + "]") < head.find(',')) return unit;
   constexpr double kEarliest = 9e8, kLatest = 4e9;  // s, 1998 to 2096
-  const double first = parseNumber(stamps.front());
+  const auto number = [](const std::string& stamp) { return static_cast<double>(parseNumber<long double>(stamp)); };
+  const double first = number(stamps.front());
   for (const StampUnit& unit : units) {
     const double seconds = first * 1e-9 * static_cast<double>(unit.length);
     if (seconds > kEarliest && seconds < kLatest) return unit;
   }
   std::vector<double> intervals;
   for (std::size_t i = 1; i < stamps.size(); ++i)
-    intervals.push_back(std::abs(parseNumber(stamps[i]) - parseNumber(stamps[i - 1])));
+    intervals.push_back(std::abs(number(stamps[i]) - number(stamps[i - 1])));
   constexpr double kMostSeconds = 1e3, kMostMicroseconds = 1e5;  // from pose to pose; the latter are ns beyond
   const double interval = intervals.empty() ? 0.0 : median(intervals);
   return units[interval < kMostSeconds ? 3 : interval < kMostMicroseconds ? 1 : 0];
@@ -217,7 +218,7 @@ StampedTrajectory readPosesAs(const std::string& path, const PoseFormat* wanted)
       std::vector<std::string> ordered;
       for (const std::size_t column : columns) ordered.push_back(words[column]);
       words = std::move(ordered);
-      format = &kTum;
+      if (!format) format = &kTum;
     }
     if (!format) format = &table->formatOf(words);
     if (wanted && format->numbers != wanted->numbers)
@@ -234,7 +235,8 @@ StampedTrajectory readPosesAs(const std::string& path, const PoseFormat* wanted)
                    parseNumber<double>);
     trajectory.poses.push_back(format->read(numbers));
     if (!format->has_stamp) return;
-    if (!stamps.empty() && parseNumber<long double>(words[0]) <= parseNumber<long double>(stamps.back()))
+    const auto stamp = parseNumber<long double>(words[0]);
+    if (!stamps.empty() && stamp <= parseNumber<long double>(stamps.back()))
       throw std::invalid_argument("stamp " + words[0] + " is not later than the one before");
     stamps.push_back(words[0]);
   });

@@ -126,6 +126,12 @@ TEST(TumPoses, ErrorsNameFileAndLine) {
   EXPECT_THROW(writeTumPoses("/dev/null", {{0}, {}}), std::invalid_argument);
   const TemporaryFile beyond("9999999999999999999 " + std::string(kIdentityLine));  // of 64 bits
   expectError([&] { readPoses(beyond.path()); }, {beyond.path(), "not a stamp"});
+  const TemporaryFile larger("1e309 0 0 0 0 0 0 1\n");  // than any double
+  expectError([&] { readPoses(larger.path()); }, {larger.path(), "out of range"});
+  const TemporaryFile lacking("# stamp tx ty tz qx qy qz qw\n1.5 2 3 0 0 0 1\n2 0 0 0 0 0 0 1\n");
+  expectError([&] { readPoses(lacking.path()); }, {lacking.path() + "', line 3: expected 7 numbers, found 8"});
+  const TemporaryFile only("1.5.5 0 0 0 0 0 0 1\n");  // no other stamp to compare it with
+  expectError([&] { readPoses(only.path()); }, {only.path() + "', line 1: '1.5.5' is not a finite number"});
 }
 
 TEST(Poses, AFormatIsKnownByItsFirstLine) {
