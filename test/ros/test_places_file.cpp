@@ -75,13 +75,9 @@ TEST_F(PlacesFile, WhatIsSavedIsLoaded) {
   EXPECT_EQ(loaded.stream.frame_id, "left_optical");
 }
 
-/// They end where right_delay and noise are now.
-TEST_F(PlacesFile, PlacesOfTheFirstVersionAreLoaded) {
-  const float added[] = {0.25f, 2.f};
-  for (Place& place : places_) place.features.right_delay = added[0], place.features.report.noise = added[1];
-  save(path_);
-  const std::string old = path_ + ".old";
-  rosbag::Bag now(path_), before(old, rosbag::bagmode::Write);
+/// Writes the places of a file as 0.1.0 did: they end where right_delay and noise are now.
+void writeOld(const std::string& path, const std::string& old, const float (&added)[2]) {
+  rosbag::Bag now(path), before(old, rosbag::bagmode::Write);
   for (const rosbag::MessageInstance& message : rosbag::View(now)) {
     std::vector<std::uint8_t> bytes(message.size());
     ros::serialization::OStream out(bytes.data(), message.size());
@@ -98,8 +94,23 @@ TEST_F(PlacesFile, PlacesOfTheFirstVersionAreLoaded) {
     shifter.read(in);
     before.write(message.getTopic(), message.getTime(), shifter);
   }
-  before.close();
-  EXPECT_EQ(loadPlaces(old).places.size(), 3u);
+}
+
+TEST_F(PlacesFile, PlacesOfTheFirstVersionAreLoadedUnlessTheirBitsHaveAnotherMeaning) {
+  const float added[] = {0.25f, 2.f};
+  const std::string old = path_ + ".old";
+  for (const char* descriptor : {"brief", "freak"}) {
+    for (Place& place : places_) {
+      place.features.descriptor = descriptor;
+      place.features.right_delay = added[0], place.features.report.noise = added[1];
+    }
+    save(path_, true);
+    writeOld(path_, old, added);
+    if (descriptor == std::string("brief"))
+      EXPECT_EQ(loadPlaces(old).places.size(), 3u);
+    else
+      expectRefused(old, "drive there again");
+  }
 }
 
 TEST_F(PlacesFile, PathsThatCannotBeWrittenAreRefused) {

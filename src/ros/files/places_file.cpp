@@ -185,12 +185,17 @@ SavedPlaces read(const std::string& path) {
     const std::string& topic = message.connection.topic;
     if (topic == kPlaceTopic) {
       std::string completed;
-      if (message.connection.md5sum == kOldPlace) {
+      const bool is_old = message.connection.md5sum == kOldPlace;
+      if (is_old) {
         completed.assign(message.data).append(2 * sizeof(float), '\0');  // right_delay and noise
         message.connection.md5sum = ros::message_traits::md5sum<msgs::Place>();
         message.data = completed;
       }
       const auto place = parse<msgs::Place>(message);
+      if (is_old && place.features.descriptor == "freak")
+        throw std::invalid_argument(
+            "its FREAK descriptors are of 0.1.0, whose bits compare other fields: drive there "
+            "again");
       places.push_back(ros_conversions::fromMessage(place));
       if (!stream) stream = ros_conversions::streamOf(place.features);
       const StereoFeatures &first = places.front().features, &last = places.back().features;
