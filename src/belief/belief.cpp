@@ -76,7 +76,7 @@ Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, co
   mixture.add({log_odds_wrong, deviation, innovationWords(found) + ": followed is something else"});
   for (const Evidence& each : evidence)
     if (each.log_odds > kUnsuspected) mixture.add({logExcess(each.log_odds), deviation, each.cause});
-  mixture.add({log_odds_, deviation, "a moment ago " + cause_});
+  mixture.add({log_odds_, deviation, "a moment ago " + cause_});  // without doubt a thousandth, which does not matter
   Belief belief;
   belief.probability = mixture.probability();
   belief.moment = mixture.moment();

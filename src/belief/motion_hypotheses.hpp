@@ -27,7 +27,7 @@ struct Agreement {
 };
 
 /// kUnsuspected: log-odds that a motion is not the camera's, without any evidence (probability of 0.001, chosen).
-/// kCertain: the same after an event that leaves a wrong map or rig.
+/// kCertain: bound of all log-odds (0.999), reached by an event that leaves a wrong map or rig.
 constexpr double kUnsuspected = -6.9, kCertain = -kUnsuspected;
 
 /// Probabilities as log-odds: log(p / (1 - p)).
@@ -53,7 +53,7 @@ struct MotionScene {
   bool searches_wide = false;  ///< the doubt makes pairs doubtful: search at once in the wide radius
   double tolerance = 0.05;     ///< m: motions that differ by less than this and 3 % are equally good
   Noise noise{NoiseOptions()};
-  std::optional<Eigen::Isometry3d> T_current_reference{};  ///< predicted; reference: the map's newest pair
+  std::optional<Eigen::Isometry3d> T_current_reference{};  ///< predicted, or the place's; reference: the newest pair
   std::optional<Eigen::Isometry3d> guess{};                ///< the same from another source than images
   std::vector<ExpectedMotion> prior{};  ///< mixture for T_reference_current; empty: all motions are equally likely
   std::optional<PlaceBelief> place{};   ///< where the map was recognised after an outage

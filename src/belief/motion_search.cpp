@@ -265,6 +265,7 @@ class MotionSearch::OnePair {
     found.motion.inliers = std::move(inliers);
     found.sightings = std::move(sightings);
     found.countAgreement();
+    // What is dropped is no evidence against the motion, but lasting points that do not fit stay lasting outliers.
     found.agreement.matches -= static_cast<int>(dropped.size());
     found.agreement.sightings -= dropped_sightings;
   }
@@ -285,8 +286,8 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   return OnePair(*this, scene, max_doubt).find();
 }
 
-/// Prior and lasting points do not contradict, and the majority agrees with the motion, all over the image. The lasting
-/// outliers beyond kLastingAgreement would be no serious rival even if they moved together.
+/// Prior and lasting points do not contradict, and the majority agrees with the motion, all over the image. Lasting
+/// matches that are missing from the share that should agree would be no serious rival even if they moved together.
 bool MotionSearch::isBeyondDoubt(const MotionHypothesis& found, double max_doubt) const {
   if (!found.motion.success || found.innovation > noiseGate(6) || logOddsWrong(found) > max_doubt) return false;
   const double agree = found.agreement.lasting_inliers;

@@ -60,14 +60,16 @@ class PoseCovariance {
   /// its covariance in the map exceeds the key frame's. Returns the covariance of the motion between the two reported
   /// poses. After a key frame, this is `since_keyframe`. Otherwise the covariances since the key frame are K + A of the
   /// pose before and K + B of this one, with the noise K of the key frame's own measurement, which cancels in the
-  /// motion: A + B. Key frame and pairs see the same points with like noise: with K as the smaller of A and B, A + B is
-  /// the larger of both covariances. Predictions and doubts of the previous pose are added.
+  /// motion: A + B. K is unknown, but key frame and pairs see the same points with like noise: if K is the smaller of A
+  /// and B, then A + B is the larger of K + A and K + B, and that is returned. Predictions and doubts of the previous
+  /// pose are added.
   Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
   /// The same in a map of one key frame.
   Matrix6d update(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
     return update(T_previous_current, since_keyframe, since_keyframe);
   }
 
+  /// To be called after update(), which moves the exposure to the new pose.
   /// Derivative of the last measured pose by the rig since the key frame (right perturbation), and the rig that was
   /// compensated. Returns the second moment that the `known` rig has in the motion between the two reported poses.
   Matrix6d updateExposure(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate& known,

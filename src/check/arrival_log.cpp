@@ -233,7 +233,7 @@ Finding ArrivalLog::checkStamps() const {
     return {Verdict::kWarn, "stamps fall; " + what, "one recording at a time, and a driver that does not restart"};
   if (Finding clock = checkLatency(delay, kOtherClock, "arrival", kOtherClock); clock.isFault()) return clock;
   if (alone > kFewLost) {
-    const std::string cause = advise(-std::numeric_limits<double>::infinity());
+    const std::string cause = advise(-std::numeric_limits<double>::infinity());  // begins with "; "
     return {Verdict::kWarn, what, cause.empty() ? std::string(kTrigger) + ", or " + kLosses : cause.substr(2)};
   }
   const auto gaps = std::count_if(periods.begin(), periods.end(), [&](double period) { return period > 1.5 * usual; });

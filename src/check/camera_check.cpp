@@ -58,7 +58,8 @@ std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals, const
       {"texture", images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share)},
       {"motion blur", images_.blur()},
       {"emitter", emitter_.judge()},
-      {"frame rate", odometry.isFault() ? frame_rate : frame_rate.asWarning()},  // which is enough to be followed
+      {"frame rate",
+       odometry.isFault() ? frame_rate : frame_rate.asWarning()},  // a rate that is followed does not fail
       {"odometry", odometry},
       {"load", checkLoad(1e-3 * times.cpu * arrivals.rate, thresholds_.max_load, ", " + times.words())}};
   const auto fault = std::find_if(steps.begin(), steps.end(),

@@ -64,6 +64,7 @@ class ExposureTurns {
   /// Mean grey level of the next pair.
   void add(double mean) {
     const bool is_brighter = mean > kMuch * last_, is_darker = last_ > kMuch * mean;
+    // After an even number the next one should be brighter, after an odd one darker; else it begins anew.
     turns_ = (turns_ % 2 == 0 ? is_brighter : is_darker) ? turns_ + 1 : is_brighter;
     last_ = mean;
   }

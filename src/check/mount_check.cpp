@@ -15,7 +15,7 @@ Finding MountCheck::judge(double tilt_sigma) const {
   constexpr double kEnough = 1.0;    // m of way (chosen)
   constexpr double kProved = 5.0;    // standard deviations of the estimated tilt (chosen)
   constexpr double kRelevant = 2.0;  // standard deviations by which the mount on TF is trusted (chosen)
-  constexpr double kDegree = M_PI / 180.0, kMost = 25.0;  // rad; deg: more is another axis
+  constexpr double kDegree = M_PI / 180.0, kMost = 25.0;  // rad; deg, also of the wide prior: more is another axis
   if (tilt_.distance() < kEnough) return {Verdict::kOpen, "too short a way", "drive two metres, with a turn"};
   const double sigma = tilt_sigma * kDegree;
   auto [tilt, covariance] = tilt_.estimate(kMost * kDegree);

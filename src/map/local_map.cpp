@@ -339,7 +339,7 @@ std::vector<double> LocalMap::parallaxToPredecessors(std::size_t frames) const {
   return parallax;
 }
 
-/// Id of the oldest frame in which the only observation of a point may be.
+/// Points with one observation are looked for if it is of this frame (id) or a later one.
 int LocalMap::lookedForSince() const {
   constexpr std::size_t kMissed = 4;  // frames of the map that may miss it
   return frames_[frames_.size() - std::min(frames_.size(), kMissed)].id;
@@ -444,8 +444,8 @@ double LocalMap::varianceOfMotion() const {
 }
 
 void LocalMap::rejectOutliers(const Problem& problem, const std::vector<double>& squares, Adjustment& adjustment) {
-  // Of a position in the image: of several disparities, which share an error, one hardly counts. The point's position
-  // errs as much as its observation's.
+  // Two degrees of freedom, those of the position in the image: disparities share an error, so a single one has little
+  // weight. The factor is because the point's position errs as much as its observation's.
   const double gate = 2.0 * noiseGate(2);
   for (const int i : problem.newest) {
     // The sigma of a corner that no patch confirms allows for a neighbour's corner. The gate does not: the point's own

@@ -41,7 +41,7 @@ class LocalMap {
   int lastKeyframeId() const;
   bool newestIsKeyframe() const { return frames_.back().is_keyframe; }
   const Eigen::Isometry3d& newestPose() const { return frames_.back().T_camera_origin; }
-  /// T_camera_origin of the last key frame before the newest pair. There must be one.
+  /// T_camera_origin of the last key frame before the newest pair: the map has no other pairs. There must be one.
   const Eigen::Isometry3d& poseBeforeNewest() const { return frames_[frames_.size() - 2].T_camera_origin; }
   /// T_oldest_newest, recalled key frames aside, and the time between the two, s.
   std::pair<Eigen::Isometry3d, double> motionOfWindow() const;

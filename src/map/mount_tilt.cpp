@@ -9,7 +9,7 @@ namespace {
 
 // Shorter ways and smaller turns of a pair are left out: ratio of the height's standard deviation, and rad (chosen).
 constexpr double kLeast = 0.1, kLeastTurn = 1e-3;
-// Least standard deviations of a way's height and of a turn, the same (chosen).
+// Least standard deviations of a way's height and of a turn, in the same units (chosen).
 constexpr double kNoise = 0.01, kNoiseTurn = 1e-4;
 
 }  // namespace
@@ -74,7 +74,8 @@ Matrix6d MountTilt::ofPose(const Eigen::Isometry3d& T_base_camera, const Eigen::
   const Eigen::Vector3d way = T_origin_base.translation();
   if (is_on_floor) known.add(way.head<2>() / height_sigma_, -way.z() / height_sigma_);
   const Estimate found = solve(known.square, known.product);
-  // The turn that makes (x, y, 1) upright is (y, -x, 0), before and after the way: E T_origin_base E^-1.
+  // The turn E that makes (x, y, 1) upright is (y, -x, 0). It tilts the axes of origin and base alike:
+  // E T_origin_base E^-1.
   Eigen::Matrix<double, 6, 2> by_normal = Eigen::Matrix<double, 6, 2>::Zero();
   by_normal(3, 1) = 1.0;
   by_normal(4, 0) = -1.0;

@@ -62,7 +62,7 @@ struct EliminatedPoint {
 
 /// A residual's square s costs bend * log(1 + s / bend) and weighs 1 / (1 + s / bend) in the normal equations.
 struct Linearisation {
-  double bend;
+  double bend;           ///< square of the kernel's scale
   double damping = 0.0;  ///< fraction of its diagonal that is added to a point's H
 };
 

@@ -206,7 +206,7 @@ class WindowOptimizer::Solver {
     const int size = 6 * poses_ + kCalibration;
     // Information of the priors alone, which the sandwich leaves as it is; then the second derivatives at the result.
     priors_.setZero(size, size);
-    addPriors(priors_, gradient_);
+    addPriors(priors_, gradient_);  // the gradient is not needed any more
     const auto [bread, meat] = sandwichScale();
     equations_.writeHessian(hessian_);
     hessian_ = bread * hessian_ + priors_;

@@ -44,7 +44,7 @@ class Lineariser {
 
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
                              const std::vector<Correspondence>& correspondences, Eigen::Isometry3d& T) {
-  constexpr double kSmallestGain = 1e-5;  // of the cost: a tenth of the deviation of a result by 300 inliers
+  constexpr double kSmallestGain = 1e-5;  // of the cost: then a step is a tenth of the result's deviation (300 inliers)
   double damping = 1e-6;
   Lineariser problem(camera, options, correspondences);
   NormalEquations equations = problem.at(T);

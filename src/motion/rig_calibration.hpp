@@ -30,8 +30,9 @@ struct RigCalibration {
   double disparityError(const StereoCamera& camera, double u, double v) const { return shape(camera, u, v).dot(value); }
 };
 
-/// Estimate of the rig: (offset, bend, roll, delay) in px, px, rad and s. The roll is the right camera's about its
-/// optical axis. The delay is the time by which right images are taken later than their stamps say.
+/// Estimate of the rig, whose effect on disparities is a RigCalibration: (offset, bend, roll, delay) in px, px, rad and
+/// s. The roll is the right camera's about its optical axis. The delay is the time by which right images are taken
+/// later than their stamps say.
 struct RigEstimate {
   static constexpr int kParameters = 4, kRoll = 2, kDelay = 3;
   using Vector = Eigen::Matrix<double, kParameters, 1>;

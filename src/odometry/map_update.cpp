@@ -21,12 +21,13 @@ MapUpdate adjust(const std::optional<Floor>& floor, OdometryTools& tools, const 
              update.calibration);
   update.T_keyframe_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && may_recall) tools.revisit.recall(features, update.calibration, map);
-  // The adjustment has one calibration for all pairs, so a delay shifts them by the window's mean rate.
+  // The adjustment has one calibration for all pairs: in it a delay acts at the window's mean rate of rotation.
   const auto [T_oldest_newest, seconds] = map.motionOfWindow();
   update.calibration_by_rig = RigEstimate::shape(
       features.camera, logSO3(T_oldest_newest.linear()) / state.prior.interval(seconds, T_oldest_newest));
   update.adjustment =
       map.adjust(tools.optimizer, state.rig.calibration.prior(update.calibration_by_rig), update.calibration, floor);
+  // The adjustment's covariance has the window's mean noise; this is the newest pair's against the rig's usual one.
   map.noteVariance(state.rig.noise.ofPair(update.adjustment.newest_square, update.adjustment.newest_measured));
   update.adjustment.since_keyframe *= map.varianceOfMotion();
   update.adjustment.growth *= map.varianceOfMotion();

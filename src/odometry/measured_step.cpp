@@ -14,7 +14,8 @@ Matrix6d unexpected(const SearchedPair& pair) {
   return innovation * innovation.transpose();
 }
 
-/// The map with the pair becomes the map. Points of a mover agree with each other: a doubtful pair confirms none.
+/// The candidate, a copy of the scene's map with the pair, becomes the map: a fallback or earlier map, too. Points of a
+/// mover agree with each other: a doubtful pair confirms none.
 void takeMap(const MapUpdate& update, bool is_doubtful, OdometryState& state) {
   std::swap(state.map, state.candidate);
   if (is_doubtful) state.map->discountNewest();
@@ -100,7 +101,7 @@ OdometryStep measuredStep(const VisualOdometryOptions& options, const std::optio
   const bool starts_again = pair.in_fallback_map && !state.fallback_has_pose;
   if (starts_again) state.startAgain();
   if (pair.in_earlier_map) state.returnToEarlierMap();
-  if (pair.in_fallback_map) state.covariance.beginMap();
+  if (pair.in_fallback_map) state.covariance.beginMap();  // startAgain() has done it already, the guess has not
   const Belief belief = state.doubt.update(*pair.scene, found, evidence);
   const bool is_doubtful = belief.probability < options.tracking.probability;
   takeMap(update, is_doubtful, state);

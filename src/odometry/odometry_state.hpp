@@ -57,7 +57,7 @@ struct OdometryState {
   double distance = 0.0;                        ///< m
   int pairs = 0;
   int epoch = 0;
-  bool started = false;
+  bool started = false;      ///< there was a map: without one the odometry is lost, not waiting
   bool frozen = false;       ///< the last images repeat the previous ones although the camera moved
   bool interrupted = false;  ///< the camera's pose in the map is unknown
 

@@ -41,7 +41,7 @@ class Outage {
 
   /// The pair has a pose, and guessedMotion() begins there.
   void havePose() { guessed_motion_ = GuessedMotion(); }
-  /// The pair's motion is measured.
+  /// The pair's motion is measured. guessedMotion() goes on until havePose().
   void end();
 
  private:

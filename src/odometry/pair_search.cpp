@@ -125,9 +125,9 @@ class PairSearch {
     return std::min(old + std::min(stop, -std::log(kTailProbability)), kCertain);
   }
 
-  /// Searches the motion as of a right camera that did not rotate, neither as is known nor by `compensated` (rad)
-  /// beyond. Each velocity that is found compensates the features better. Returns the new rotation that then results,
-  /// `compensated` included.
+  /// Takes the known rotation of the right camera and `compensated` (rad) out of the features, then searches the
+  /// motion: sets features, scene and found of the pair. Each velocity that is found compensates the delay and the rows
+  /// better. Returns the new rotation that then results, `compensated` included.
   RotationHypothesis searchRotatedBack(const Eigen::Vector3d& compensated) {
     constexpr int kPasses = 3;  // at most, for rows; each leaves some hundredths of the velocity's error
     const Eigen::Vector3d rotation = state_.rig.rotation + compensated;
@@ -230,6 +230,7 @@ class PairSearch {
     const RotationHypothesis with_yaw = searchRotatedBack(yaw);
     if (pair_.found.motion.success && pair_.found.agreement.inliers > inliers && with_yaw.log_odds > 0.0)
       pair_.rotation = with_yaw;
+    // Else the trial is undone; where the first rotation is likely, searchWith() searches with that next.
     else if (!(pair_.rotation.log_odds > 0.0))
       searchRotatedBack(Eigen::Vector3d::Zero());
   }
@@ -261,6 +262,7 @@ class PairSearch {
       const auto place = tools_.places.find(*map, pair_.features, state_.rig.calibration.calibration());
       const double since = map->secondsUntil(pair_.features);
       if (!place || !state_.prior.tooFast(place->T_current_newest.inverse(), Matrix6d::Zero(), since).empty()) continue;
+      // The velocity is from before the outage, and the place has weighed the prior: neither predicts the motion.
       MotionScene& scene = pair_.scene.emplace(sceneOf(*map, 0.0, std::nullopt));
       scene.place = choosePlace(*place, scene.prior);
       scene.T_current_reference = scene.place->T_current_newest;

@@ -51,16 +51,17 @@ struct SearchedPair {
   bool repeats_a_part = false;               ///< some rows repeat those of the previous pair
 
   StereoFeatures whole;            ///< all features in the map's pixels
-  std::vector<int> given_indices;  ///< of the features below, which do not repeat the previous pair's, as given
+  std::vector<int> given_indices;  ///< among the caller's features, of each below: those that repeat are left out
   StereoFeatures rotated_back;     ///< without the right camera's learnt rotation
   StereoFeatures features;         ///< of one moment, too: both views and all rows. The motion is found with these
 
   RotationHypothesis rotation;       ///< a new one of the right camera, which is compensated if it is likely
   std::optional<RolledPair> rolled;  ///< the pair before its rows were moved to the stamp; only with a rolling shutter
-  std::optional<LocalMap> unrolled_map;  ///< the map whose newest pair is moved by the velocity at it, known by now
-  std::optional<MotionScene> scene;      ///< where the motion is searched; none for a first pair or a frozen one
-  bool in_fallback_map = false;          ///< the scene is of the fallback map
-  bool in_earlier_map = false;           ///< the scene is of the map from before a restart
+  /// Copy of the map, with its newest pair's rows moved by the velocity that this pair's motion shows.
+  std::optional<LocalMap> unrolled_map;
+  std::optional<MotionScene> scene;  ///< where the motion is searched; none for a first pair or a frozen one
+  bool in_fallback_map = false;      ///< the scene is of the fallback map
+  bool in_earlier_map = false;       ///< the scene is of the map from before a restart
   MotionHypothesis found;
 
   /// From the reference of the motion, s. There must be a scene.

@@ -88,7 +88,8 @@ OdometryStep holdPose(double dt, OdometryState& state) {
                     ? "each pair comes twice: is the driver's rate above the sensor's?"
                     : "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
   step.T_previous_current = Eigen::Isometry3d::Identity();
-  // Velocities of successive steps are correlated: the pose gets what this step adds to all, the motion its own part.
+  // Velocities of successive steps are correlated. So the pose's covariance grows by the difference of the outage's
+  // totals after and before the step; the motion has that of the step alone.
   step.covariance = state.prior.lastStepCovariance(state.outage.seconds(), dt);
   state.covariance.predict(*step.T_previous_current, state.outage.growth(state.prior, dt));
   state.prior.interrupt();

@@ -45,6 +45,7 @@ class VisualOdometry::Impl {
     OdometryStep step = map_update.success ? measuredStep(options, floor(), pair, map_update, evidence, state)
                                            : unmeasured(pair, map_update.refusal, evidence);
     admitReadout(pair, measured, step);
+    // The first pair, without a scene, is TRACKING without a motion.
     state.rig.learn(pair.features, measured ? &*measured : nullptr, pair.found, pair.rotation,
                     step.state == TrackingState::kTracking && pair.scene);
     finish(pair, step);
@@ -110,12 +111,12 @@ class VisualOdometry::Impl {
   /// Evidence of the pair that its motion is not the camera's.
   std::vector<Evidence> evidenceAgainst(const SearchedPair& pair, const std::optional<MeasuredPair>& measured) const {
     constexpr int kManyMatches = 100;  // of a pair (chosen): if no motion fits so many, points are not lacking
-    // A motion between the map, which is from before the rotation, and disparities that are rotated may err.
+    // After a new rotation the motion may be wrong: the map was made before it, the pair after it.
     std::vector<Evidence> evidence{
         {pair.rotation.log_odds, pair.rotation.words()},
         {pair.rotation.log_odds_of_other_moment, "the right image seemed to be of another moment"}};
     if (pair.features.report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
-    // A map that begins after such a pair may have a late right image, too: nothing else has shown its disparities.
+    // A map that begins after such a pair may have a late right image, too: no earlier map contradicts its depths.
     if (state.outage.hasRefused() && pair.in_fallback_map)
       evidence.push_back({kCertain, "left and right of pairs before it did not belong together", true});
     if (pair.kind == SearchedPair::kContinues) {
@@ -232,7 +233,7 @@ void VisualOdometry::takePose(const Matrix6d& covariance) {
   ++state.epoch;
   if (!state.interrupted) return;
   state.map.reset();
-  state.started = false;
+  state.started = false;  // the next pair starts a map there, as a first pair, without another epoch
 }
 
 const Eigen::Isometry3d& VisualOdometry::lastPose() const {

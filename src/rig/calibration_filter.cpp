@@ -106,6 +106,7 @@ void CalibrationFilter::update(int oldest_id, int newest_id, const RigEstimate::
   compensated_ << calibration.value.head<2>(), calibration.value[2] / shape(2, RigEstimate::kRoll), delay();
   calibration_ = calibration;
   // 1. The window's own information, without its prior: own * own_mean = (own + prior) * value - prior * prior_mean.
+  // The value lacks the effect of the delay, for which disparities are compensated: by_delay adds it again.
   // Only one triangle of `information` is accurate, and an asymmetry would grow from window to window.
   const RigCalibration::Vector by_delay = shape.col(RigEstimate::kDelay) * compensated_[RigEstimate::kDelay];
   const RigCalibration::Matrix own = 0.5 * kRealInformation * (information + information.transpose());

@@ -113,7 +113,8 @@ RigEstimate::Matrix LearntRig::rotate(const RotationHypothesis& new_rotation, co
     covariance_before_ = std::exchange(rotation_covariance, covariance);
     return calibration.widen(camera, new_rotation.covariance);
   }
-  // The rig is again as before the last rotation: an error of images, no knock.
+  // The rig is again as before the last rotation: an error of images, no knock. Its whole square is this rig's noise at
+  // once, so that the next such error is not believed.
   std::swap(rotation, rotation_before_), std::swap(rotation_covariance, covariance_before_);
   rotation_noise_ += new_rotation.value * new_rotation.value.transpose();
   return RigEstimate::Matrix::Zero();

@@ -45,6 +45,7 @@ Synchronised synchronised(const StereoFeatures& features, int i, double delay, c
     // In the middle of the delay.
     const RightFlow flow =
         rightFlow(features.camera, velocity, u - 0.5 * delay * result.flow.x(), v - 0.5 * delay * result.flow.y());
+    // disparity = measured + delay * (far + disparity * near), solved for it.
     result.disparity = (features.disparity[i] + delay * flow.far.x()) / (1.0 - delay * flow.near.x());
     result.flow = flow.far + result.disparity * flow.near;
   }
@@ -88,7 +89,8 @@ constexpr double kLeastTurning = 2.0;  // px/s: more than errors of measured rot
 }  // namespace
 
 double logRatioOfDelay(const std::vector<RowMotion>& rows, double delay, double row_error) {
-  // A right image of an earlier moment looks like the left image's error, which a synchronous rig's rows have, too.
+  // The velocity ends at this left image, so an error of its rows is in the velocity and, negated, in dv: as if the
+  // right image were of an earlier moment.
   std::bitset<RowDelay::kParts> seen;
   for (const RowMotion& row : rows) seen.set(static_cast<std::size_t>(row.part));
   const double parts = static_cast<double>(seen.count()) - 1.0;  // one fixes the constant
@@ -119,10 +121,10 @@ void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Ve
   const StereoFeatures& middle = pairs_[1].features;
   const StereoCamera& camera = middle.camera;
   const double stamped = middle.right_delay, delay = stamped + known;
-  const Vector6d near = pairs_[1].velocity + pairs_[2].velocity, far = pairs_[0].velocity + pairs_[3].velocity;
+  const Vector6d inner = pairs_[1].velocity + pairs_[2].velocity, outer = pairs_[0].velocity + pairs_[3].velocity;
   const Vector6d at = velocityAmong(pairs_[0].velocity, pairs_[1].velocity, pairs_[2].velocity, pairs_[3].velocity);
   const Vector6d during = velocityDuring(delay, dt, pairs_[1].velocity, at, pairs_[2].velocity);
-  const Vector6d slow = 0.25 * (near + far);
+  const Vector6d slow = 0.25 * (inner + outer);
   std::vector<RowDelay::Sample> rows;
   rows.reserve(middle.u.size());
   for (int i = 0; i < middle.count(); ++i) {

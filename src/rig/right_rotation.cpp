@@ -182,6 +182,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
   }
   const UnknownsMatrix inverse = equations.hessian.inverse();
   found.covariance = equations.sandwich(inverse);
+  // For an error of 1 px of each row and disparity: n / 3 of them constrain each of the three directions.
   found.by_pixel = static_cast<double>(inliers.size()) / (3.0 * disparity_sigma * disparity_sigma) *
                    inverse.bottomRightCorner<3, 3>();
   return found;

@@ -33,6 +33,7 @@ RowDelay::Fit RowDelay::fit(const Parts& parts) {
   for (const Sums& part : parts) {
     if (!(part.weight > 0.0)) continue;
     const Eigen::Matrix3d square = part.square - part.motion * part.meanMotion().transpose();
+    // Instruments (turning, disparity) times regressors (velocity, disparity): not symmetric.
     fit.information.row(0) += square.row(0).tail<2>();
     fit.information.row(1) += square.row(2).tail<2>();
     product += instruments(part.product - part.motion * part.meanDv());
