@@ -64,7 +64,8 @@ Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, co
   // Lasting points that agree refute the doubt of earlier pairs.
   if (lasts()) log_odds_ = std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain);
 
-  // Second moment of the error if the motion is wrong. Without a prior, it is that of standstill.
+  // A wrong motion errs by its difference from the prior's motion; without a prior, by that from standstill. This is
+  // the second moment of that error.
   const ExpectedMotion expected = scene.prior.empty() ? ExpectedMotion() : scene.prior.front();
   const Vector6d innovation = expected.innovation(found.motion.T_current_reference.inverse());
   const Matrix6d deviation = momentOf(innovation) + expected.covariance;

@@ -275,8 +275,8 @@ PlaceBelief choosePlace(const FoundPlace& place, const std::vector<ExpectedMotio
   if (place.alike)
     belief.mixture.add({logWeight(other) - logWeight(chosen), momentOf(logSE3(chosen * other.inverse())),
                         "other places of the map look alike"});
-  // Or the map matched by chance, and the camera moved as one of the priors says. The odds are place.chance against a
-  // place that contradicts all priors, and kTailProbability of that against one that agrees with a prior.
+  // The map may have matched by chance, while one of the priors is right. Against a place that no prior explains, the
+  // odds of this are place.chance. Against a place that a prior explains, they are kTailProbability times smaller.
   const double by_chance = kTailProbability * place.chance;
   for (const ExpectedMotion& expected : prior)
     belief.mixture.add({std::log(by_chance) - logWeight(chosen),

@@ -265,7 +265,7 @@ class MotionSearch::OnePair {
     found.motion.inliers = std::move(inliers);
     found.sightings = std::move(sightings);
     found.countAgreement();
-    // What is dropped is no evidence against the motion, but lasting points that do not fit stay lasting outliers.
+    // Dropped inliers are no evidence against the motion, but lasting points that do not fit stay lasting outliers.
     found.agreement.matches -= static_cast<int>(dropped.size());
     found.agreement.sightings -= dropped_sightings;
   }

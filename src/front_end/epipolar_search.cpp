@@ -13,8 +13,8 @@
 namespace sdvo {
 namespace {
 
-constexpr int kHalfRows = 4;  // block rows above and below the centre at half resolution
-constexpr int kFullRows = 5;  // … and at full resolution
+constexpr int kHalfRows = 4;  // block rows above and below the centre, at half resolution (chosen)
+constexpr int kFullRows = 5;  // the same at full resolution (chosen)
 constexpr int kSame = 2;      // px at half resolution (chosen): blocks so near the best one are the same place
 
 constexpr int kMargin = SearchedImages::kMargin;

@@ -8,7 +8,7 @@ namespace sdvo::test_stamp_filter {
 
 using Passed = std::vector<std::pair<int, int>>;
 
-/// What comes, and the items that pass then, with the restarts of their source; items are their own running numbers.
+/// A stamp that arrives, and the items that pass then: (running number, restarts of the source so far).
 struct Step {
   double stamp, now;  ///< s
   Passed passed;

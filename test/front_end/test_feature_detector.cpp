@@ -406,7 +406,7 @@ TEST_P(CornerDetector, LocatesDotsBetweenPixels) {
     EXPECT_LT(cv::norm(error), kTolerance) << "at " << truth[i] << " by " << error;
     offset += error / static_cast<double>(errors.size());
   }
-  // What is left in the mean is an offset of the coordinates.
+  // Errors of single corners average out; an offset of the coordinates would remain.
   EXPECT_NEAR(offset.x, 0.0, 0.03);
   EXPECT_NEAR(offset.y, 0.0, 0.03);
 }

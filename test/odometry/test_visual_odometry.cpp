@@ -531,8 +531,8 @@ TEST_F(GuessedTurn, AWrongGuessDoesNoHarm) {
   }
 }
 
-/// What comes to cover the view seems to stand. No camera with the velocity before does: 8 m/s could be gone in a
-/// pair or two, but hardly ever are.
+/// A cover that fills the view seems to stand. A camera with the velocity before hardly does: 8 m/s could be gone in a
+/// pair or two.
 TEST(VisualOdometry, DoesNotTrustAStandstillRightAfterALossOnTheWay) {
   Drive drive;
   drive("gggggg");

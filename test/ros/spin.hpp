@@ -12,7 +12,7 @@ inline bool waitUntil(const std::function<bool()>& condition) {
   return condition();
 }
 
-/// What comes from ROS meanwhile, it takes in the thread of the test.
+/// Meanwhile the thread of the test runs ROS' callbacks.
 inline bool spinUntil(const std::function<bool()>& condition) {
   return waitUntil([&] {
     ros::spinOnce();

@@ -57,7 +57,7 @@ class OptionList {
   void add(const std::string& name, Number& value, Range range, const std::string& unit, const std::string& meaning) {
     options_.push_back({prefix_ + name, &value, range, {}, unit, meaning});
   }
-  /// A bool, a text, or an enum with names, see named_enum.hpp.
+  /// The value is a bool, a text, or an enum whose choices have names (named_enum.hpp).
   template <class Value>
   void add(const std::string& name, Value& value, const std::string& meaning) {
     if constexpr (std::is_enum_v<Value>) {

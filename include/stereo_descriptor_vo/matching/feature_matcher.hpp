@@ -27,10 +27,10 @@ struct DescribedPoints {
 };
 
 struct FeatureMatcherOptions {
-  double gate_radius = 20.0;  ///< px, of the search around a predicted left position
-  double max_distance = 0.3;  ///< see FeatureMatch::distance
+  double gate_radius = 20.0;  ///< px (chosen), around a predicted left position
+  double max_distance = 0.3;  ///< see FeatureMatch::distance (chosen)
 
-  /// For a prediction that may be wrong.
+  /// For a prediction that may be wrong: three times as far.
   static FeatureMatcherOptions wide() { return {60.0}; }
 };
 
@@ -48,8 +48,9 @@ class FeatureMatcher {
 
   const FeatureMatcherOptions& options() const { return options_; }
 
-  /// Matches in the order of the reference's points. With a prediction of the motion, only features near their
-  /// predicted position are compared. Throws std::invalid_argument when the descriptors are of different kinds.
+  /// Returns matches in the order of the reference's points. With a predicted motion, a point is compared only with
+  /// features within gate_radius of its predicted position; without one, with all. Throws std::invalid_argument when
+  /// the descriptors are of different kinds.
   std::vector<FeatureMatch> match(const DescribedPoints& reference, const StereoFeatures& current,
                                   const std::optional<Eigen::Isometry3d>& T_current_reference) const;
 

@@ -56,7 +56,7 @@ geometry_msgs::TransformStamped transformOfCamera() {
   return transform;
 }
 
-/// What comes back, in ms by stamp.
+/// Latencies of the messages that come back, ms, by stamp.
 class Answers {
  public:
   void takeOdometry(const nav_msgs::Odometry& odometry) {
