@@ -5,11 +5,11 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sdvo;
-  FuzzedDataProvider bytes(data, size);
+  FuzzBytes bytes(data, size);
   // One odometry for all: what comes after a message that was accepted must hold, too.
   static VisualOdometry odometry{VisualOdometryOptions{}};
   static std::int64_t stamp = 0;
-  const auto type = bytes.PickValueInArray({ElementType::kBits, ElementType::kUint8, ElementType::kFloat32});
+  const auto type = bytes.oneOf(std::array{ElementType::kBits, ElementType::kUint8, ElementType::kFloat32});
   stereo_descriptor_vo::StereoFeatures input =
       ros_conversions::toMessage(ros_conversions::someFeatures(type), DepthScaleOptions{});
   damage(input, bytes);

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <fuzzer/FuzzedDataProvider.h>
-
 #include <cstddef>
 #include <string>
 
@@ -11,36 +9,37 @@
 #include "../../src/messages/image_conversions.hpp"
 #include "../../src/messages/odometry_conversions.hpp"
 #include "../../src/messages/pose_conversions.hpp"
+#include "fuzz_bytes.hpp"
 
 namespace sdvo {
 
 /// Sometimes any other bits.
 template <class Value>
-void replace(Value& value, FuzzedDataProvider& bytes) {
-  if (bytes.ConsumeBool()) bytes.ConsumeData(&value, sizeof(value));
+void replace(Value& value, FuzzBytes& bytes) {
+  if (bytes.flag()) value = bytes.any<Value>();
 }
 
-inline void replace(std::string& text, FuzzedDataProvider& bytes) {
-  if (bytes.ConsumeBool()) text = bytes.ConsumeRandomLengthString(12);
+inline void replace(std::string& text, FuzzBytes& bytes) {
+  if (bytes.flag()) text = bytes.text(12);
 }
 
 /// Some elements of any other bits.
 template <class Container>
-void damageElements(Container& values, FuzzedDataProvider& bytes) {
-  while (!values.empty() && bytes.ConsumeBool()) {
-    auto& element = values[bytes.ConsumeIntegralInRange<std::size_t>(0, values.size() - 1)];
-    bytes.ConsumeData(&element, sizeof(element));
+void damageElements(Container& values, FuzzBytes& bytes) {
+  while (!values.empty() && bytes.flag()) {
+    auto& element = values[bytes.upTo(values.size() - 1)];
+    element = bytes.any<std::decay_t<decltype(element)>>();
   }
 }
 
 /// Sometimes of another length, with some other elements.
 template <class Vector>
-void damage(Vector& values, FuzzedDataProvider& bytes) {
-  if (bytes.ConsumeBool()) values.resize(bytes.ConsumeIntegralInRange<std::size_t>(0, 64));
+void damage(Vector& values, FuzzBytes& bytes) {
+  if (bytes.flag()) values.resize(bytes.upTo(64));
   damageElements(values, bytes);
 }
 
-inline void damage(stereo_descriptor_vo::StereoFeatures& message, FuzzedDataProvider& bytes) {
+inline void damage(stereo_descriptor_vo::StereoFeatures& message, FuzzBytes& bytes) {
   replace(message.image_width, bytes), replace(message.image_height, bytes);
   for (double* value : {&message.fx, &message.fy, &message.cx, &message.cy, &message.baseline}) replace(*value, bytes);
   replace(message.bytes_per_row, bytes), replace(message.stream_epoch, bytes);

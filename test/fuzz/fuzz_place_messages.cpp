@@ -11,7 +11,7 @@ namespace {
 using namespace sdvo;
 namespace msgs = stereo_descriptor_vo;
 
-void damage(msgs::PlaceSignature& message, FuzzedDataProvider& bytes) {
+void damage(msgs::PlaceSignature& message, FuzzBytes& bytes) {
   replace(message.descriptor, bytes), replace(message.layout, bytes), replace(message.element_type, bytes);
   replace(message.bytes_per_row, bytes), replace(message.words_per_row, bytes), replace(message.bits_per_word, bytes);
   sdvo::damage(message.words, bytes);
@@ -41,7 +41,7 @@ void compareWith(const msgs::Place& message, const PlaceRecognition& known) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  FuzzedDataProvider bytes(data, size);
+  FuzzBytes bytes(data, size);
   static const PlaceRecognition known = [] {
     PlaceRecognition recognition{PlaceRecognitionOptions()};
     const SavedPlaces some = fuzz::somePlaces();

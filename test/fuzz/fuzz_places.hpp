@@ -47,29 +47,29 @@ inline SavedPlaces somePlaces() {
   return some;
 }
 
-inline void damage(geometry_msgs::Pose& pose, FuzzedDataProvider& bytes) {
+inline void damage(geometry_msgs::Pose& pose, FuzzBytes& bytes) {
   for (double* value : {&pose.position.x, &pose.position.y, &pose.position.z, &pose.orientation.x, &pose.orientation.y,
                         &pose.orientation.z, &pose.orientation.w})
     replace(*value, bytes);
 }
 
-inline void damage(stereo_descriptor_vo::Place& message, FuzzedDataProvider& bytes) {
+inline void damage(stereo_descriptor_vo::Place& message, FuzzBytes& bytes) {
   replace(message.id, bytes), replace(message.segment, bytes), replace(message.travelled, bytes);
   replace(message.features.header.stamp.sec, bytes);
   damage(message.pose, bytes);
   sdvo::damage(message.features, bytes);
 }
 
-inline void damage(stereo_descriptor_vo::MapGraph& message, FuzzedDataProvider& bytes) {
-  if (bytes.ConsumeBool()) message.nodes.resize(bytes.ConsumeIntegralInRange<std::size_t>(0, 6));
-  if (bytes.ConsumeBool()) message.edges.resize(bytes.ConsumeIntegralInRange<std::size_t>(0, 6));
+inline void damage(stereo_descriptor_vo::MapGraph& message, FuzzBytes& bytes) {
+  if (bytes.flag()) message.nodes.resize(bytes.upTo(6));
+  if (bytes.flag()) message.edges.resize(bytes.upTo(6));
   for (stereo_descriptor_vo::MapNode& node : message.nodes) {
-    if (!bytes.ConsumeBool()) continue;
+    if (!bytes.flag()) continue;
     replace(node.id, bytes);
     damage(node.pose, bytes);
   }
   for (stereo_descriptor_vo::MapEdge& edge : message.edges) {
-    if (!bytes.ConsumeBool()) continue;
+    if (!bytes.flag()) continue;
     replace(edge.kind, bytes), replace(edge.from_id, bytes), replace(edge.to_id, bytes);
     replace(edge.length, bytes), replace(edge.turn, bytes);
     damage(edge.motion.pose, bytes);

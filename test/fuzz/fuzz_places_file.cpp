@@ -13,7 +13,7 @@ namespace {
 using namespace sdvo;
 namespace msgs = stereo_descriptor_vo;
 
-void write(const std::string& path, FuzzedDataProvider& bytes) {
+void write(const std::string& path, FuzzBytes& bytes) {
   const SavedPlaces some = fuzz::somePlaces();
   rosbag::Bag bag(path, rosbag::bagmode::Write);
   for (const Place& place : some.places) {
@@ -21,15 +21,15 @@ void write(const std::string& path, FuzzedDataProvider& bytes) {
     fuzz::damage(message, bytes);
     bag.write("place", ros::Time(1), message);
   }
-  if (bytes.ConsumeBool()) bag.write(bytes.ConsumeBool() ? "place" : "map_graph", ros::Time(1), std_msgs::Header());
+  if (bytes.flag()) bag.write(bytes.flag() ? "place" : "map_graph", ros::Time(1), std_msgs::Header());
   msgs::MapGraph graph = ros_conversions::toMessage({some.graph, {}}, "/robot", "map");
   fuzz::damage(graph, bytes);
-  if (!bytes.ConsumeBool()) bag.write("map_graph", ros::Time(2), graph);
+  if (!bytes.flag()) bag.write("map_graph", ros::Time(2), graph);
   bag.close();
   // A file that was not written to its end.
-  if (bytes.ConsumeBool()) {
+  if (bytes.flag()) {
     const auto whole = static_cast<std::size_t>(std::filesystem::file_size(path));
-    std::filesystem::resize_file(path, bytes.ConsumeIntegralInRange<std::size_t>(0, whole));
+    std::filesystem::resize_file(path, bytes.upTo(whole));
   }
 }
 
@@ -64,7 +64,7 @@ void goOn(const SavedPlaces& saved) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  FuzzedDataProvider bytes(data, size);
+  FuzzBytes bytes(data, size);
   static const TemporaryFolder folder;
   const std::string path = (std::filesystem::path(folder.path()) / "places.bag").string();
   write(path, bytes);

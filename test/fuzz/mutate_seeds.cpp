@@ -1,6 +1,6 @@
-// The main function of the fuzz targets where libFuzzer is missing: PROGRAM SECONDS FOLDER feeds the files of a folder,
-// then mutations of them, always the same ones in the same order. An input that ends the process stays in
-// PROGRAM-input.
+// The main function of the fuzz targets where libFuzzer is missing: PROGRAM SECONDS [FOLDER] feeds the files of a
+// folder, then mutations of them, always the same ones in the same order; without a folder, bytes most of which are
+// zero. An input that ends the process stays in PROGRAM-input.
 #include <unistd.h>
 
 #include <algorithm>
@@ -31,6 +31,7 @@ class Mutator {
   explicit Mutator(std::vector<std::string> seeds) : seeds_(std::move(seeds)) {}
 
   std::string next() {
+    if (seeds_.empty()) return sparse();
     std::string input = seeds_[below(seeds_.size())];
     for (std::size_t mutations = 1 + below(4); mutations > 0; --mutations) mutate(input);
     input.resize(std::min(input.size(), kLargest));
@@ -40,6 +41,15 @@ class Mutator {
  private:
   /// The same with every standard library, other than its distributions.
   std::size_t below(std::size_t count) { return random_() % count; }
+
+  /// Each byte is zero but for one of 1 to 64: many zeros leave most of a message as it was.
+  std::string sparse() {
+    std::string input(kLargest / 8, '\0');
+    const std::size_t rarity = std::size_t{1} << below(7);
+    for (char& byte : input)
+      if (below(rarity) == 0) byte = static_cast<char>(below(256));
+    return input;
+  }
 
   void mutate(std::string& input) {
     const std::size_t from = below(input.size() + 1), count = below(std::min<std::size_t>(input.size() - from, 40) + 1);
@@ -84,20 +94,21 @@ void feed(const std::string& input, const std::string& kept) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::cerr << "usage: " << argv[0] << " SECONDS FOLDER\n";
+  if (argc != 2 && argc != 3) {
+    std::cerr << "usage: " << argv[0] << " SECONDS [FOLDER]\n";
     return 1;
   }
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::seconds(std::atoi(argv[1]));
   std::vector<std::string> paths, seeds;
-  for (const auto& entry : std::filesystem::directory_iterator(argv[2])) paths.push_back(entry.path().string());
+  if (argc == 3)
+    for (const auto& entry : std::filesystem::directory_iterator(argv[2])) paths.push_back(entry.path().string());
   std::sort(paths.begin(), paths.end());
   for (const std::string& path : paths) {
     std::ifstream file(path, std::ios::binary);
     seeds.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
   }
-  if (seeds.empty()) {
+  if (argc == 3 && seeds.empty()) {
     std::cerr << argv[2] << " has no seed\n";
     return 1;
   }
