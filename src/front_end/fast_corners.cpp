@@ -198,6 +198,7 @@ float maximumOf(int before, int here, int after) {
 
 std::vector<cv::KeyPoint> findFastCorners(const cv::Mat& image, int threshold) {
   CV_Assert(image.type() == CV_8UC1);
+  threshold = std::min(threshold, 255);  // no contrast is larger; vectors, OpenCV's as well, would see its lowest byte
 #ifdef SDVO_HAVE_AVX2
   const bool large_enough = image.cols >= kBlock + 2 * kRadius && image.rows > 2 * kRadius;
   if (usesVectorKernels() && large_enough) return findWithAvx2(image, threshold);

@@ -25,7 +25,7 @@ void expectCornersOfOpenCv(const cv::Mat& image, int threshold) {
 }
 
 TEST(FastCorners, AreThoseOfOpenCv) {
-  for (const int threshold : {1, 12, 40, 100}) {
+  for (const int threshold : {1, 12, 40, 100, 254}) {
     const cv::Mat image = synthetic::noise({317, 113}, 3);
     expectCornersOfOpenCv(image, threshold);
     cv::Mat smooth;
@@ -41,6 +41,14 @@ TEST(FastCorners, AreThoseOfOpenCvInImagesOfAnySize) {
     expectCornersOfOpenCv(synthetic::noise({width, 23}, static_cast<unsigned>(width)), 10);
   for (int height = 1; height <= 12; ++height)
     expectCornersOfOpenCv(synthetic::noise({70, height}, static_cast<unsigned>(height)), 10);
+}
+
+/// Noise of 28 grey levels asks for as much.
+TEST(FastCorners, NoContrastIsLargerThanAByte) {
+  const cv::Mat extremes = synthetic::noise({317, 113}, 3) > 200;
+  withEveryKernel([&] {
+    for (const int threshold : {255, 256, 260, 900}) EXPECT_TRUE(findFastCorners(extremes, threshold).empty());
+  });
 }
 
 TEST(FastCorners, AreThoseOfOpenCvInPartsOfImages) {
