@@ -21,12 +21,12 @@ Finding checkMount(const std::string& base_frame, const std::string& camera_fram
                     "z forward) was expected; name it as the images' frame_id");
 }
 
-void OpticalAxisCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now) {
+void OpticalAxisCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_previous_current) {
   constexpr double kUp = 0.7;  // cosine of 45 degrees
   if (T_base_camera.linear()(2, 2) < kUp) return;
-  const Eigen::Vector3d turn = logSO3(T_before_now.linear());
-  along_axis_ += T_before_now.translation().z();
-  distance_ += T_before_now.translation().norm();
+  const Eigen::Vector3d turn = logSO3(T_previous_current.linear());
+  along_axis_ += T_previous_current.translation().z();
+  distance_ += T_previous_current.translation().norm();
   about_axis_ += std::abs(turn.z());
   about_others_ += turn.head<2>().norm();
   is_sideways_ = std::abs(T_base_camera.linear()(0, 0)) < kUp;
@@ -61,7 +61,8 @@ void GyroAxesCheck::add(std::int64_t from, std::int64_t to, const Eigen::Matrix3
   constexpr double kLeast = 0.2 * M_PI / 180.0;  // rad, as much as bias and noise give
   constexpr double kKept = 60.0 * M_PI / 180.0;  // rad, thrice what suffices
   const Pair pair{from, to, logSO3(by_gyro), logSO3(by_images)};
-  if (std::max(pair.by_gyro.norm(), pair.by_images.norm()) < kLeast) return;
+  // What shakes the gyro of a robot that stands is no turn: in an hour it would outweigh the next one.
+  if (pair.by_images.norm() < kLeast) return;
   turned_ += pair.by_images.norm();
   pairs_.push_back(pair);
   for (; turned_ - pairs_.front().by_images.norm() > kKept; pairs_.pop_front())
@@ -89,7 +90,8 @@ Finding GyroAxesCheck::judge(const Gyro& gyro) const {
   for (std::int64_t k = -kSteps; k <= kSteps; ++k) {
     Turns shifted;
     for (const Pair& pair : pairs_)
-      if (const auto turn = gyro(pair.from + k * kStep, pair.to + k * kStep)) shifted.add(logSO3(*turn), pair.by_images);
+      if (const auto turn = gyro(pair.from + k * kStep, pair.to + k * kStep))
+        shifted.add(logSO3(*turn), pair.by_images);
     if (shifted.of_images < kKnown * turns.of_images || shifted.cosine() <= best) continue;
     best = shifted.cosine();
     shift = k * kStep;

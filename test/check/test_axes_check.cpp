@@ -16,11 +16,11 @@ constexpr double kDegree = M_PI / 180.0;
 /// Of 60 steps that each turn by `turn`, rad.
 Verdict verdictOf(const Matrix3d& R_base_camera, const Vector3d& step, const Vector3d& turn = Vector3d::Zero()) {
   OpticalAxisCheck check;
-  Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity(), T_before_now = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity(), T_previous_current = Eigen::Isometry3d::Identity();
   T_base_camera.linear() = R_base_camera;
-  T_before_now.translation() = step;
-  if (turn.norm() > 0.0) T_before_now.linear() = AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-  for (int i = 0; i < 60; ++i) check.add(T_base_camera, T_before_now);
+  T_previous_current.translation() = step;
+  if (turn.norm() > 0.0) T_previous_current.linear() = AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  for (int i = 0; i < 60; ++i) check.add(T_base_camera, T_previous_current);
   return check.judge().verdict;
 }
 
@@ -111,6 +111,21 @@ TEST(GyroAxesCheck, AFaultThatBeginsLateIsNamed) {
   EXPECT_EQ(add(3600, turn.toRotationMatrix()), Verdict::kOk);
   EXPECT_EQ(add(60, turn.inverse().toRotationMatrix()), Verdict::kWarn);
   EXPECT_EQ(add(60, turn.toRotationMatrix()), Verdict::kOk);
+}
+
+TEST(GyroAxesCheck, AnHourOfShakingInPlaceDoesNotOutweighATurn) {
+  for (const double shaking : {0.3, 2.0}) {  // degrees a pair
+    GyroAxesCheck check;
+    const auto add = [&](int pairs, double by_gyro, double by_images) {
+      const Vector3d axis = Vector3d::UnitY();
+      for (int i = 0; i < pairs; ++i)
+        check.add(i, i + 1, AngleAxisd(by_gyro * kDegree, axis).toRotationMatrix(),
+                  AngleAxisd(by_images * kDegree, axis).toRotationMatrix());
+    };
+    add(36000, shaking, 0.0);
+    add(25, 1.0, 1.0);
+    EXPECT_EQ(check.judge([](std::int64_t, std::int64_t) { return std::nullopt; }).verdict, Verdict::kOk) << shaking;
+  }
 }
 
 TEST(GyroAxesCheck, NothingIsSaidWithoutATurn) {
