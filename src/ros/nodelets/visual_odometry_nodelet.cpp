@@ -236,7 +236,9 @@ class VisualOdometryNodelet : public RobotNodelet {
       const std::lock_guard<std::mutex> lock(work_mutex_);
       if (!imu_ || axes_->trustsGyro()) guess.since = processed_;
     }
-    if (guess.since && mount_->last() && guesses_->hasSource()) guess.motion = awaitGuess(*guess.since, header, isVoid);
+    // Of another camera the last mount is not, and without one there is no guess of its motion.
+    const bool is_mounted = mount_->knows(options_.base_frame_id, camera_frame);
+    if (guess.since && is_mounted && guesses_->hasSource()) guess.motion = awaitGuess(*guess.since, header, isVoid);
     if (options_.awaitsMotion()) guess.T_guess_base = guesses_->base(header.stamp);
     return guess;
   }
@@ -431,7 +433,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     if (!T_base_camera)
       throw std::invalid_argument("there is no pose yet: set initial_pose, or wait for the first pair");
     const Matrix6d to_camera = adjoint(T_base_camera->inverse());
-    odometry_->takePose(to_camera * covariance * to_camera.transpose());
+    odometry_->setPoseCovariance(to_camera * covariance * to_camera.transpose());
     const Eigen::Isometry3d T_start_base = *T_base_camera * odometry_->lastPose() * T_base_camera->inverse();
     publisher_->moveTo(T_odom_base * T_start_base.inverse());
     start_->give();
