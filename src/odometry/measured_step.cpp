@@ -97,8 +97,8 @@ OdometryStep measuredStep(const VisualOdometryOptions& options, const std::optio
                           const SearchedPair& pair, const MapUpdate& update, const std::vector<Evidence>& evidence,
                           OdometryState& state) {
   const MotionHypothesis& found = pair.found;
-  const double since = pair.sinceReference();
-  const bool starts_again = pair.in_fallback_map && !state.fallback_has_pose;
+  const double since = pair.sinceReference();  // takeMap() changes the scene's map
+  const bool starts_again = pair.in_fallback_map && !state.fallback_keeps_epoch;
   if (starts_again) state.startAgain();
   if (pair.in_earlier_map) state.returnToEarlierMap();
   if (pair.in_fallback_map) state.covariance.beginMap();  // startAgain() has done it already, the guess has not

@@ -47,6 +47,7 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
     result.readout = readout->value, result.readout_sigma = readout->sigma;
   if (const auto rotation = rig.row_pattern.rotation()) {
     Eigen::Vector3d value = rotation->value, variance = rotation->covariance.diagonal();
+    // The filter knows the roll by windows, too; its variance is zero if the calibration is not estimated.
     const double of_roll = known.covariance(RigEstimate::kRoll, RigEstimate::kRoll);
     if (of_roll > 0.0) value.z() = known.mean[RigEstimate::kRoll], variance.z() = of_roll;
     result.right_rotation = rig.rotation + value;
@@ -58,7 +59,7 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
 
 OdometryState::OdometryState(const VisualOdometryOptions& options, int first_epoch)
     : rig(unknownRig(options)),
-      shutter(options.calibration.readout, options.tracking.rotation_acceleration),
+      shutter(options.calibration, options.tracking.rotation_acceleration),
       prior(options.tracking),
       floor(options.planar),
       epoch(first_epoch) {}
@@ -67,11 +68,13 @@ void OdometryState::forgetRig(const VisualOdometryOptions& options) {
   covariance.changeRig(rig.calibration.estimate());
   if (earlier) earlier->covariance.changeRig(rig.calibration.estimate());
   rig = unknownRig(options);
+  shutter.begin(options.calibration);
+  newest_rolled.reset();  // its rows were moved by the readout before
 }
 
-void OdometryState::walkRig(const RigEstimate& known, const RigEstimate::Matrix& step) {
-  covariance.walkRig(known, step);
-  if (earlier) earlier->covariance.walkRig(known, step);
+void OdometryState::walkRig(const RigEstimate& known, const RigEstimate::Matrix& step_covariance) {
+  covariance.walkRig(known, step_covariance);
+  if (earlier) earlier->covariance.walkRig(known, step_covariance);
 }
 
 void OdometryState::interrupt() {
@@ -79,15 +82,18 @@ void OdometryState::interrupt() {
   prior.interrupt();
 }
 
-void OdometryState::recover(const VisualOdometryOptions& options) {
+void OdometryState::restartAt(const ReportedPose& pose, const VisualOdometryOptions& options) {
   OdometryState fresh(options, epoch);
-  fresh.T_origin_camera = last_sound.T_origin_camera;
-  fresh.covariance.reset(last_sound.pose_covariance);
-  fresh.distance = last_sound.distance;
+  fresh.T_origin_camera = pose.T_origin_camera;
+  fresh.covariance.reset(pose.covariance);
+  fresh.distance = pose.distance;
+  fresh.last_pose_stamp = pose.stamp;
+  fresh.last_sound = pose;
   fresh.map_camera = map_camera, fresh.pair_camera = pair_camera;
-  fresh.last_stamp = last_stamp, fresh.last_pose_stamp = last_pose_stamp;
+  fresh.last_stamp = last_stamp;
   fresh.pairs = pairs, fresh.started = started;
-  fresh.last_sound = std::move(last_sound);
+  fresh.interrupted = true;
+  if (pose.stamp != last_stamp) fresh.outage.missGuess();  // those of pairs since the pose are forgotten, too
   *this = std::move(fresh);
 }
 
@@ -96,9 +102,10 @@ void OdometryState::startAgain() {
   map.reset();
   ++epoch;
   const std::int64_t last = last_pose_stamp.value_or(fallback_map->newestStamp());
-  const Matrix6d unseen = prior.outageCovariance(static_cast<double>(fallback_map->newestStamp() - last) * 1e-9);
+  // No motion was found even where no time passed: a constant is added to what grows with time.
+  const Matrix6d meanwhile = prior.outageCovariance(static_cast<double>(fallback_map->newestStamp() - last) * 1e-9);
   covariance.beginMap();
-  covariance.inflate(prior.unmeasuredCovariance() + unseen);
+  covariance.inflate(prior.unmeasuredCovariance() + meanwhile);
   last_pose_stamp = fallback_map->newestStamp();
 }
 
@@ -129,7 +136,6 @@ void OdometryState::recalibrate(const VisualOdometryOptions& options, const Ster
   forgetRig(options);
   covariance.beginMap();
   forgetMaps();
-  newest_rolled.reset();
   map.emplace(options.map);
   map->insert(given, pairs, T_origin_camera.inverse(), {}, rig.calibration.calibration());
   map_camera = pair_camera = given.camera;
@@ -139,6 +145,11 @@ void OdometryState::recalibrate(const VisualOdometryOptions& options, const Ster
 void OdometryState::move(const Eigen::Isometry3d& T_previous_current) {
   T_origin_camera = orthonormalised(T_origin_camera * T_previous_current);
   distance += T_previous_current.translation().norm();
+}
+
+ReportedPose OdometryState::lastPose() const {
+  return {T_origin_camera, covariance.value() + covariance.byRig(rig.calibration.estimate()), distance,
+          last_pose_stamp};
 }
 
 OdometryResult OdometryState::report(const SearchedPair& pair, const OdometryStep& step,
@@ -155,7 +166,7 @@ OdometryResult OdometryState::report(const SearchedPair& pair, const OdometrySte
   if (step.hasPose()) {
     result.has_pose = true;
     result.T_origin_camera = T_origin_camera;
-    result.pose_covariance = covariance.value() + covariance.byRig(rig.calibration.estimate());
+    result.pose_covariance = lastPose().covariance;
     if (known_floor) result.pose_covariance = floor.covariance(*known_floor, T_origin_camera, result.pose_covariance);
   }
   if (step.T_previous_current && !step.changes_epoch) {

@@ -29,6 +29,14 @@ struct EarlierMap {
   int epoch;
 };
 
+/// A pose from which the odometry can go on, whatever else is forgotten.
+struct ReportedPose {
+  Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
+  Matrix6d covariance = Matrix6d::Zero();
+  double distance = 0.0;              ///< m, travelled up to there
+  std::optional<std::int64_t> stamp;  ///< ns; none before the first pose
+};
+
 /// The memory of the odometry from pair to pair.
 struct OdometryState {
   std::optional<LocalMap> map;
@@ -36,7 +44,7 @@ struct OdometryState {
   /// The map that the newest pair of an outage begins, at the guesses' pose, else at the last pose. It replaces `map`
   /// once the next pair is measured against it.
   std::optional<LocalMap> fallback_map;
-  bool fallback_has_pose = false;  ///< its pose is that of the guesses
+  bool fallback_keeps_epoch = false;  ///< its pose is by guesses of whole motions
   std::optional<EarlierMap> earlier;
   std::optional<RolledPair> newest_rolled;  ///< the newest pair of map or fallback map; only with a rolling shutter
   LearntRig rig;
@@ -52,7 +60,7 @@ struct OdometryState {
   std::optional<std::int64_t> last_stamp;
   Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
   PoseCovariance covariance;                    ///< of that pose
-  OdometryResult last_sound;                    ///< the last one with a pose and without a defect
+  ReportedPose last_sound;                      ///< the last one without a defect
   std::optional<std::int64_t> last_pose_stamp;  ///< ns
   double distance = 0.0;                        ///< m
   int pairs = 0;
@@ -68,15 +76,14 @@ struct OdometryState {
 
   /// The estimates of the rig start anew.
   void forgetRig(const VisualOdometryOptions& options);
-  /// The rig walked by a random step after it was `known`.
-  void walkRig(const RigEstimate& known, const RigEstimate::Matrix& step);
+  /// The rig walked by a random step of this covariance after it was `known`.
+  void walkRig(const RigEstimate& known, const RigEstimate::Matrix& step_covariance);
 
   /// The next pair does not continue the last one.
   void interrupt();
 
-  /// A result had a defect, whose cause may be anywhere in the memory: only the last sound pose and what the caller
-  /// gave is kept. The next pair starts a map there under a new epoch.
-  void recover(const VisualOdometryOptions& options);
+  /// Forgets all but a pose and what the caller gave. The next pair starts a map there under a new epoch.
+  void restartAt(const ReportedPose& pose, const VisualOdometryOptions& options);
 
   /// A new epoch begins with the fallback map. The unknown motion before it widens the covariance. The map, if any,
   /// becomes the earlier one.
@@ -94,6 +101,7 @@ struct OdometryState {
   void recalibrate(const VisualOdometryOptions& options, const StereoFeatures& given);
 
   void move(const Eigen::Isometry3d& T_previous_current);
+  ReportedPose lastPose() const;
 
   OdometryResult report(const SearchedPair& pair, const OdometryStep& step,
                         const std::optional<Floor>& known_floor) const;

@@ -22,7 +22,7 @@ Eigen::Isometry3d motionBy(const MotionGuess& guess, const MotionPrior& prior, d
 
 void Outage::extend(double dt, const std::optional<MotionGuess>& guess, const MotionPrior& prior) {
   seconds_ += dt;
-  if (!guess) guessed_motion_.reset();
+  if (!guess) missGuess();
   if (!guessed_motion_) return;
   const Eigen::Isometry3d motion = motionBy(*guess, prior, dt);
   Matrix6d covariance = covarianceOf(*guess, prior.around(motion, dt).covariance);

@@ -41,7 +41,9 @@ class Outage {
 
   /// The pair has a pose, and guessedMotion() begins there.
   void havePose() { guessed_motion_ = GuessedMotion(); }
-  /// The pair's motion is measured. guessedMotion() goes on until havePose().
+  /// There is no guessedMotion() until havePose().
+  void missGuess() { guessed_motion_.reset(); }
+  /// The pair's motion is measured.
   void end();
 
  private:

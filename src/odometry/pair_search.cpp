@@ -72,7 +72,8 @@ class PairSearch {
   }
 
   /// Of the motion that is found, by its inliers' aligned positions, up to a constant: half of each square, up to the
-  /// gate, which is what a wrong match costs. All counts half, for the map's points err as much as the pair's.
+  /// gate, which is what a wrong match costs. All counts half, because the map's point errs as much as the pair's and
+  /// the squares are twice as large.
   double logLikelihood() const {
     const StereoCamera& camera = pair_.features.camera;
     const NoiseOptions& noise = options_.noise;
@@ -213,7 +214,7 @@ class PairSearch {
     pair_.scene.reset();
     pair_.in_earlier_map = pair_.in_fallback_map = false;
     if (pair_.kind == SearchedPair::kContinues)
-      pair_.scene.emplace(sceneOf(pair_.unrolled_map ? *pair_.unrolled_map : *state_.map, pair_.dt, guess_));
+      pair_.scene.emplace(sceneOf(pair_.unrolled_map ? *pair_.unrolled_map : *state_.map, guess_));
     if (pair_.kind == SearchedPair::kAfterOutage) findPlace();
     pair_.found = pair_.scene ? tools_.motions.find(*pair_.scene, largestDoubt(options_.tracking)) : MotionHypothesis();
     if (!pair_.found.motion.success) return Vector6d::Zero();
@@ -237,7 +238,7 @@ class PairSearch {
 
   /// The map, the pair, and the expected motion between them: that of predicted pairs since the reference, then the
   /// velocity or the guess.
-  MotionScene sceneOf(const LocalMap& map, double dt, const std::optional<MotionGuess>& guess) const {
+  MotionScene sceneOf(const LocalMap& map, const std::optional<MotionGuess>& guess) const {
     const MotionPrior& prior = state_.prior;
     const bool searches_wide = state_.doubt.logOdds() > largestDoubt(options_.tracking);
     MotionScene scene{map,           state_.rig.calibration.calibration(), pair_.features,  state_.doubt.lasts(),
@@ -245,10 +246,10 @@ class PairSearch {
     const Eigen::Isometry3d T_reference_previous = map.newestPose() * state_.T_origin_camera;
     const double since = map.secondsUntil(pair_.features);
     if (const auto confirmed = prior.priorByConfirmed(map.newestStamp(), since)) scene.prior.push_back(*confirmed);
-    if (prior.velocity() && dt <= options_.tracking.max_gap)
-      scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
+    if (prior.velocity() && pair_.dt <= options_.tracking.max_gap)
+      scene.T_current_reference = (T_reference_previous * prior.predicted(pair_.dt).motion).inverse();
     if (guess) {
-      scene.guess = (T_reference_previous * motionBy(*guess, prior, dt)).inverse();
+      scene.guess = (T_reference_previous * motionBy(*guess, prior, pair_.dt)).inverse();
       if (!scene.prior.empty()) scene.prior.push_back(prior.around(scene.guess->inverse(), since));
     }
     return scene;
@@ -263,7 +264,7 @@ class PairSearch {
       const double since = map->secondsUntil(pair_.features);
       if (!place || !state_.prior.tooFast(place->T_current_newest.inverse(), Matrix6d::Zero(), since).empty()) continue;
       // The velocity is from before the outage, and the place has weighed the prior: neither predicts the motion.
-      MotionScene& scene = pair_.scene.emplace(sceneOf(*map, 0.0, std::nullopt));
+      MotionScene& scene = pair_.scene.emplace(sceneOf(*map, std::nullopt));
       scene.place = choosePlace(*place, scene.prior);
       scene.T_current_reference = scene.place->T_current_newest;
       scene.prior.clear();
@@ -271,7 +272,7 @@ class PairSearch {
       return;
     }
     if (!state_.fallback_map) return;
-    pair_.scene.emplace(sceneOf(*state_.fallback_map, 0.0, std::nullopt));
+    pair_.scene.emplace(sceneOf(*state_.fallback_map, std::nullopt));
     pair_.in_fallback_map = true;
   }
 

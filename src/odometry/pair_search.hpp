@@ -59,12 +59,13 @@ struct SearchedPair {
   std::optional<RolledPair> rolled;  ///< the pair before its rows were moved to the stamp; only with a rolling shutter
   /// Copy of the map, with its newest pair's rows moved by the velocity that this pair's motion shows.
   std::optional<LocalMap> unrolled_map;
-  std::optional<MotionScene> scene;  ///< where the motion is searched; none for a first pair or a frozen one
-  bool in_fallback_map = false;      ///< the scene is of the fallback map
-  bool in_earlier_map = false;       ///< the scene is of the map from before a restart
+  /// Where the motion is searched, with references to the maps of the state; none for a first pair or a frozen one.
+  std::optional<MotionScene> scene;
+  bool in_fallback_map = false;  ///< the scene is of the fallback map
+  bool in_earlier_map = false;   ///< the scene is of the map from before a restart
   MotionHypothesis found;
 
-  /// From the reference of the motion, s. There must be a scene.
+  /// From the reference of the motion, s. There must be a scene, and its map must not have changed.
   double sinceReference() const { return scene->map.secondsUntil(features); }
 };
 

@@ -1,4 +1,3 @@
-
 #include "odometry_state.hpp"
 
 namespace sdvo {
@@ -57,18 +56,19 @@ OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures
   state.fallback_map.emplace(options.map);
   state.fallback_map->insert(features, state.pairs, (state.T_origin_camera * T_previous_current).inverse(), {},
                              state.rig.calibration.calibration());
-  state.fallback_has_pose = is_guessed && !guessed->rotation_only;
+  state.fallback_keeps_epoch = is_guessed && !guessed->rotation_only;
 
   // The fallback map replaces a map from before the outage only when a pair is measured against it.
   const bool has_map = state.started && state.map && state.map->continuedBy(features);
   if (is_guessed) {
-    const OdometryStep step = stepBy(*guessed,
-                                     std::string(has_map ? "not found in the map: goes on" : "started again") +
-                                         (guessed->rotation_only ? " as the gyro turned; the translation is predicted"
-                                                                 : " where the guess has the camera"),
-                                     state);
+    OdometryStep step = stepBy(*guessed,
+                               std::string(has_map ? "not found in the map: goes on" : "started again") +
+                                   (guessed->rotation_only ? " as the gyro turned; the translation is predicted"
+                                                           : " where the guess has the camera"),
+                               state);
     if (has_map) return step;
-    if (guessed->rotation_only) ++state.epoch;  // the position is not known
+    step.changes_epoch = guessed->rotation_only;  // the position is not known
+    if (step.changes_epoch) ++state.epoch;
     state.useFallbackMap();
     return step;
   }

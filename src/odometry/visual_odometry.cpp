@@ -52,7 +52,7 @@ class VisualOdometry::Impl {
     rememberRolled(pair, step);
     step.time = stopwatch.lap();
     const OdometryResult result = checkedResult(state.report(pair, step, floor()));
-    if (estimatesReadout()) state.shutter.setReadout(state.rig.readout.usableValue());
+    if (state.shutter.isEstimated()) state.shutter.takeEstimate(state.rig.readout.usableValue());
     // A driver's fault is short: a calibration that lasts is new.
     if (result.has_pose && pair.refutes_camera_info &&
         1e-9 * static_cast<double>(given.stamp - *state.camera_info_stamp) > options.tracking.max_gap)
@@ -70,8 +70,6 @@ class VisualOdometry::Impl {
     if (!options.planar.planar) return std::nullopt;
     return Floor(options.planar, T_base_camera, state.floor.height());
   }
-
-  bool estimatesReadout() const { return options.calibration.enabled && options.calibration.readout == 0.0; }
 
   void refuse(const StereoFeatures& features) const {
     features.check();
@@ -94,9 +92,9 @@ class VisualOdometry::Impl {
     if (features.report.refused) state.outage.noteRefused();
     const RigEstimate before = state.rig.calibration.estimate();
     // A clock's jump ages no rig.
-    RigEstimate::Matrix step = state.rig.calibration.predict(std::min(pair.dt, options.tracking.max_gap));
-    if (pair.rotation.log_odds > 0.0) step += state.rig.rotate(pair.rotation, features.camera);
-    state.walkRig(before, step);
+    RigEstimate::Matrix step_covariance = state.rig.calibration.predict(std::min(pair.dt, options.tracking.max_gap));
+    if (pair.rotation.log_odds > 0.0) step_covariance += state.rig.rotate(pair.rotation, features.camera);
+    state.walkRig(before, step_covariance);
   }
 
   /// The pair with its measured motion; none without a motion, or with one that spans an outage.
@@ -122,7 +120,7 @@ class VisualOdometry::Impl {
     if (pair.kind == SearchedPair::kContinues) {
       evidence.push_back(
           {pair.log_odds_of_frozen, "images as of the previous pair, by a stop or a frozen driver", true});
-      // After a short gap, the views may not be of one rigid world, and the next map would be as wrong.
+      // Little changes within max_gap: left and right may disagree, also in the map that this pair begins.
       if (!pair.found.motion.success && pair.found.agreement.matches >= kManyMatches &&
           pair.dt <= options.tracking.max_gap)
         evidence.push_back({kCertain, "many matches agreed on no motion", true});
@@ -146,7 +144,7 @@ class VisualOdometry::Impl {
 
   /// Widens covariances by what is unknown of the shutter's readout.
   void admitReadout(const SearchedPair& pair, const std::optional<MeasuredPair>& measured, OdometryStep& step) {
-    if (!measured || !step.T_previous_current || !estimatesReadout()) return;
+    if (!measured || !step.T_previous_current || !state.shutter.isEstimated()) return;
     const Matrix6d moment =
         state.rig.readout.momentOf(measured->features, pair.found, measured->since_reference, state.shutter.readout());
     step.covariance += moment;
@@ -165,7 +163,7 @@ class VisualOdometry::Impl {
       step.reason = "a part of the left image repeats that of the previous pair";
     if (pair.refutes_camera_info && step.reason.empty())
       step.reason = "camera_info changed, but the images did not: the calibration before it is used";
-    const bool since_pose = step.T_previous_current && state.last_pose_stamp;
+    const bool since_pose = step.T_previous_current && !step.changes_epoch && state.last_pose_stamp;
     step.dt = since_pose ? static_cast<double>(features.stamp - *state.last_pose_stamp) * 1e-9 : pair.dt;
     if (step.T_previous_current) state.move(*step.T_previous_current);
     if (!step.hasPose()) return;
@@ -175,6 +173,7 @@ class VisualOdometry::Impl {
 
   /// Widens covariances by the error of the pair's velocity, and keeps the pair until the next motion is known.
   void rememberRolled(SearchedPair& pair, OdometryStep& step) {
+    if (!pair.rolled) state.newest_rolled.reset();  // the next motion is not from there
     const auto ends_with_it = [&](const std::optional<LocalMap>& map) {
       return map && map->newestStamp() == pair.features.stamp;
     };
@@ -195,10 +194,10 @@ class VisualOdometry::Impl {
   OdometryResult checkedResult(OdometryResult result) {
     const std::string defect = result.defect();
     if (defect.empty()) {
-      if (result.has_pose) state.last_sound = result;
+      if (result.has_pose) state.last_sound = state.lastPose();
       return result;
     }
-    state.recover(options);
+    state.restartAt(state.last_sound, options);  // the cause may be anywhere in the memory
     OdometryResult lost;
     lost.state = TrackingState::kLost;
     lost.reason = "defect of the odometry: " + defect + "; goes on from the last sound pose. Please report it";
@@ -223,7 +222,7 @@ void VisualOdometry::breakStream() {
   impl_->state.interrupt();
 }
 
-void VisualOdometry::takePose(const Matrix6d& covariance) {
+void VisualOdometry::setPoseCovariance(const Matrix6d& covariance) {
   OdometryResult given;
   given.has_pose = true, given.pose_covariance = covariance;
   if (const std::string defect = given.defect(); !defect.empty()) throw std::invalid_argument(defect);
@@ -256,12 +255,15 @@ void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
   const Eigen::Isometry3d T_before_now = impl_->T_base_camera.inverse() * T_base_camera;
   const bool is_same = T_base_camera.matrix() == impl_->T_base_camera.matrix();
   impl_->T_base_camera = T_base_camera;
-  if (is_same || !state.started) return;
-  state.interrupt();
-  state.forgetMaps();  // they are in the old camera's axes
-  state.forgetRig(impl_->options);
-  state.T_origin_camera = orthonormalised(T_before_now.inverse() * state.T_origin_camera * T_before_now);
-  state.covariance.predict(T_before_now, Matrix6d::Zero());
+  if (is_same || !state.last_pose_stamp) return;
+  // Maps, velocities and guesses up to now are in the old camera's axes; the floor is in the base's.
+  const FloorBelief floor = state.floor;
+  const Eigen::Isometry3d T_now_before = T_before_now.inverse();
+  ReportedPose last = state.lastPose();
+  last.T_origin_camera = orthonormalised(T_now_before * last.T_origin_camera * T_before_now);
+  last.covariance = carried(T_now_before, last.covariance);
+  state.restartAt(last, impl_->options);
+  state.floor = floor;
 }
 
 std::vector<Eigen::Vector3d> VisualOdometry::mapPoints() const {

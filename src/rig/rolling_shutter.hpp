@@ -6,6 +6,7 @@
 #include "../belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
 
@@ -71,13 +72,23 @@ struct RolledPair {
 /// motion is known.
 class RollingShutter {
  public:
-  /// `readout`, s: from the first row to the last; negative if the last row is the first one taken.
   /// `rotation_acceleration`: a, standard deviation of the rate's change in 1 s, rad/s, until motions are learnt.
-  RollingShutter(double readout, double rotation_acceleration)
-      : readout_(readout), acceleration_square_(rotation_acceleration * rotation_acceleration) {}
+  RollingShutter(const CalibrationOptions& options, double rotation_acceleration)
+      : acceleration_square_(rotation_acceleration * rotation_acceleration) {
+    begin(options);
+  }
 
+  /// For another camera: the options' readout is used, or 0 until one is estimated. What motions are like stays.
+  void begin(const CalibrationOptions& options) {
+    readout_ = options.readout;
+    is_estimated_ = options.enabled && readout_ == 0.0;
+  }
+
+  /// s, from the first row to the last; negative if the last row is the first one taken.
   double readout() const { return readout_; }
-  void setReadout(double readout) { readout_ = readout; }
+  /// Whether takeEstimate() sets the readout.
+  bool isEstimated() const { return is_estimated_; }
+  void takeEstimate(double readout) { readout_ = readout; }
   bool isRolling() const { return readout_ != 0.0; }
 
   /// The features as a global shutter would have seen them at the stamp.
@@ -104,7 +115,8 @@ class RollingShutter {
   /// Variance of the rate of velocityAt() without rows, rad^2/s^2.
   double varianceAt(const RolledPair& pair) const;
 
-  double readout_;
+  bool is_estimated_ = false;
+  double readout_ = 0.0;
   double acceleration_square_;  ///< a^2, rad^2/s^3
   double learnt_pairs_ = 0.0;   ///< number of learn() calls, bounded
 };

@@ -350,7 +350,7 @@ TEST_F(GuessedOutage, AGuessThatEndsCarriesNoPose) {
 TEST_F(Outage, APoseFromElsewhereIsANewEpochOfTheSameMap) {
   drive();
   const Matrix6d covariance = 0.01 * Matrix6d::Identity();
-  odometry_->takePose(covariance);
+  odometry_->setPoseCovariance(covariance);
   EXPECT_TRUE(odometry_->lastPose().isApprox(result_.T_origin_camera));
   see(room_, kSeen);
   expectState(TrackingState::kTracking, 1);
@@ -363,7 +363,7 @@ TEST_F(Outage, APoseFromElsewhereEndsTheSearchOfALostCamera) {
   drive();
   const int i = blind(5);
   const Eigen::Isometry3d last = odometry_->lastPose();
-  odometry_->takePose(0.01 * Matrix6d::Identity());
+  odometry_->setPoseCovariance(0.01 * Matrix6d::Identity());
   see(room_, i);
   expectState(TrackingState::kTracking, 1);
   EXPECT_TRUE(result_.T_origin_camera.isApprox(last));

@@ -23,24 +23,30 @@ std::vector<Eigen::Isometry3d> drive(int pairs, const Pitch& pitch, const Yaw& y
   return poses;
 }
 
-/// `pitch`: deg, by which the odometry is told that the camera looks down.
-std::vector<OdometryResult> follow(const std::vector<Eigen::Isometry3d>& poses, bool planar, double pitch = 0.0) {
+/// `pitch`: deg, by which the odometry is told that the camera looks down. From pair `raised_at` on the camera is 10 cm
+/// higher on the base.
+std::vector<OdometryResult> follow(const std::vector<Eigen::Isometry3d>& poses, bool planar, double pitch = 0.0,
+                                   std::size_t raised_at = 1000) {
   static const synthetic::World world = synthetic::randomWorld(3, 25000, {-60.0, -8.0, -10.0}, {60.0, 4.0, 130.0});
   VisualOdometryOptions options;
   options.planar.planar = planar;
   VisualOdometry odometry(options);
   Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
   T_base_camera.linear() << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
-  odometry.mountAt(Eigen::AngleAxisd(pitch * kDegree, Eigen::Vector3d::UnitY()) * T_base_camera);
+  const Eigen::Isometry3d T_base_first = Eigen::Translation3d(0.0, 0.0, 1.0) *
+                                         Eigen::AngleAxisd(pitch * kDegree, Eigen::Vector3d::UnitY()) * T_base_camera;
+  odometry.mountAt(T_base_first);
   std::vector<OdometryResult> results;
   for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Eigen::Isometry3d T_first_now(Eigen::Translation3d(0.0, i < raised_at ? 0.0 : -0.1, 0.0));
+    odometry.mountAt(T_base_first * T_first_now);
     synthetic::Sighting sighting;
     sighting.noise = 0.8;  // px: lets a free odometry rise by several of the floor's standard deviations
     sighting.strangers = 40;
     sighting.max_depth = 25.0;
     sighting.seed = 100 + static_cast<unsigned>(i);
     results.push_back(
-        odometry.update(synthetic::observe(world, synthetic::camera(), poses[i].inverse(),
+        odometry.update(synthetic::observe(world, synthetic::camera(), (poses[i] * T_first_now).inverse(),
                                            1000000000 + static_cast<std::int64_t>(i) * 100000000, sighting)));
   }
   return results;
@@ -96,6 +102,17 @@ TEST(PlanarOdometry, ARampIsToldOfAndALevelStretchBehindItIsAnotherFloor) {
   }
   EXPECT_EQ(floors, 1);
   EXPECT_EQ(results.back().reason, "");
+}
+
+/// The floor belongs to the base, whose pose does not change.
+TEST(PlanarOdometry, AnotherMountIsOnTheSameFloor) {
+  const auto poses = drive(
+      110, [](int i) { return i >= 40 && i < 60 ? 5.0 * kDegree : 0.0; }, [](int) { return 0.0; });
+  const auto results = follow(poses, true, 0.0, 90);
+  ASSERT_EQ(results[89].reason, "");
+  EXPECT_EQ(results[90].epoch, results[89].epoch + 1);
+  EXPECT_FALSE(contains(results[90].reason, "off the floor")) << results[90].reason;
+  for (std::size_t i = 91; i < 110; ++i) EXPECT_FALSE(contains(results[i].reason, "off the floor")) << i;
 }
 
 TEST(PlanarOdometry, AWrongMountIsInTheCovarianceOfTheHeight) {

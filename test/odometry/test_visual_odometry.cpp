@@ -257,7 +257,7 @@ TEST(VisualOdometry, StatesFollowFromWhatThePairsShow) {
   struct Scenario {
     std::string pairs, states, why;
     int epoch = 0;
-    std::string words;  ///< of the last reason
+    std::string words{};  ///< of the last reason
   };
   for (const Scenario& s : std::vector<Scenario>{
            {"bbb gg", "WWW TT", "waits for the first features"},
@@ -567,11 +567,12 @@ TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
 TEST(VisualOdometry, ACovarianceThatIsNoneIsLostAndGoesOn) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 8);
-  odometry.takePose(1e308 * Matrix6d::Identity());  // the next motion multiplies it beyond all numbers
+  odometry.setPoseCovariance(1e308 * Matrix6d::Identity());  // the next motion multiplies it beyond all numbers
   const OdometryResult lost = odometry.update(pairOf(9));
   expectState(lost, TrackingState::kLost, "covariance of the pose is not finite");
   EXPECT_FALSE(lost.has_pose);
-  const OdometryResult again = odometry.update(pairOf(10));
+  // The guess of the last motion alone does not reach back to the sound pose.
+  const OdometryResult again = odometry.update(pairOf(10), MotionGuess{trueSinceStart(10, 9), false, 0.1});
   expectState(again, TrackingState::kDegraded, "started again");
   EXPECT_GT(again.epoch, lost.epoch);
   EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera));
@@ -593,9 +594,9 @@ TEST(VisualOdometry, RefusesGuessesMountsAndCovariancesThatAreNone) {
     EXPECT_THROW(odometry.update(pairOf(5), guess), std::invalid_argument);
   EXPECT_THROW(odometry.mountAt(scaled.T_previous_current), std::invalid_argument);
   EXPECT_THROW(odometry.mountAt(unknown.T_previous_current), std::invalid_argument);
-  EXPECT_THROW(odometry.takePose(nan * Matrix6d::Identity()), std::invalid_argument);
-  EXPECT_THROW(odometry.takePose(-Matrix6d::Identity()), std::invalid_argument);
-  EXPECT_THROW(odometry.takePose(Matrix6d::Identity() - Matrix6d::Ones()), std::invalid_argument);
+  EXPECT_THROW(odometry.setPoseCovariance(nan * Matrix6d::Identity()), std::invalid_argument);
+  EXPECT_THROW(odometry.setPoseCovariance(-Matrix6d::Identity()), std::invalid_argument);
+  EXPECT_THROW(odometry.setPoseCovariance(Matrix6d::Identity() - Matrix6d::Ones()), std::invalid_argument);
   expectSame(odometry.update(pairOf(5)), undisturbed.update(pairOf(5)));
 }
 
@@ -766,6 +767,71 @@ TEST(VisualOdometry, AnotherCameraOfTheRobotGoesOnFromTheBasesPose) {
     const Eigen::Isometry3d base = T_base_b * after.T_origin_camera * T_base_b.inverse();
     EXPECT_LT(distanceBetween(base, expected), 2e-3) << i;
     EXPECT_LT(angleBetween(base, expected), 1e-3) << i;
+  }
+}
+
+/// In the new camera's axes the velocity from before would make each motion a doubtful one. Guesses count from the last
+/// pose on.
+TEST(VisualOdometry, AMountThatTurnsFarLeavesNoVelocityToExpect) {
+  const Eigen::Isometry3d T_before_now(Eigen::AngleAxisd(0.5 * CV_PI, Eigen::Vector3d::UnitY()));
+  const Eigen::Isometry3d T_base_before(Eigen::Translation3d(0.4, 0.1, 0.5));
+  const auto turned = [&](const Eigen::Isometry3d& motion) { return T_before_now.inverse() * motion * T_before_now; };
+  for (const bool is_guessed : {true, false})
+    for (const bool is_blind : {true, false}) {  // before the change
+      VisualOdometry odometry({});
+      odometry.mountAt(T_base_before);
+      OdometryResult before = follow(odometry, 8);
+      for (int i = 9; i <= 11; ++i) before = odometry.update(is_blind ? blindPair(i) : pairOf(i));
+      ASSERT_EQ(before.has_pose, !is_blind);
+      odometry.mountAt(T_base_before * T_before_now);
+      const bool goes_on = is_guessed && !is_blind;
+      for (int i = 12; i <= 17; ++i) {
+        const StereoFeatures pair = pairAt(drivePose(i) * T_before_now, i, street());
+        const std::optional<MotionGuess> guess{{turned(trueSinceStart(i, i - 1)), false, 0.1}};
+        const OdometryResult after = odometry.update(pair, is_guessed ? guess : std::nullopt);
+        EXPECT_EQ(after.epoch, before.epoch + !goes_on) << i;
+        if (i == 12) continue;
+        expectState(after, TrackingState::kTracking);
+        EXPECT_GT(after.probability, 0.99) << i;
+      }
+    }
+}
+
+/// A pose that is set after the change is where the next pair begins, as after each interruption.
+TEST(VisualOdometry, APoseThatIsSetAfterAnotherMountIsKept) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 8);
+  odometry.mountAt(Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 1.0)));
+  odometry.setPoseCovariance(0.01 * Matrix6d::Identity());
+  const OdometryResult after = odometry.update(pairOf(9));
+  EXPECT_EQ(after.epoch, before.epoch + 1);
+  EXPECT_LT(positionSigma(after), 0.2);
+}
+
+TEST(VisualOdometry, AnotherCameraWithAGyroHasNoMotionFromTheEpochBefore) {
+  for (const bool rotation_only : {true, false}) {
+    VisualOdometry odometry({});
+    const OdometryResult before = follow(odometry, 8);
+    StereoFeatures pair = pairOf(9);
+    pair.camera.baseline *= 1.5;
+    const OdometryResult after = odometry.update(pair, MotionGuess{trueSinceStart(9, 8), rotation_only, 0.1});
+    EXPECT_TRUE(after.has_pose);
+    EXPECT_EQ(after.epoch, before.epoch + rotation_only);
+    EXPECT_EQ(after.has_motion, !rotation_only);
+  }
+}
+
+TEST(VisualOdometry, AnotherReadoutIsTakenOverWithTheNextEstimate) {
+  VisualOdometryOptions given, estimated;
+  given.calibration.readout = 0.01;
+  for (const bool begins_given : {true, false}) {
+    VisualOdometry odometry(begins_given ? given : estimated);
+    follow(odometry, 4);
+    odometry.configure(begins_given ? estimated : given);
+    EXPECT_EQ(odometry.update(pairOf(5)).used_readout, begins_given ? 0.01 : 0.0);
+    EXPECT_EQ(odometry.update(pairOf(6)).used_readout, begins_given ? 0.01 : 0.0);
+    odometry.reset();
+    EXPECT_EQ(odometry.update(pairOf(7)).used_readout, begins_given ? 0.0 : 0.01);
   }
 }
 

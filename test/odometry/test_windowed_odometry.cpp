@@ -194,7 +194,7 @@ ThereAndBack driveThereAndBack(int remembered_keyframes) {
   scene.disparity_noise = 1.2;
   VisualOdometryOptions options;
   options.map.remembered_keyframes = remembered_keyframes;
-  options.map.lasting_points = 50;
+  options.map.min_shared_points = 50;
   VisualOdometry odometry(options);
   ThereAndBack drive;
   Eigen::Isometry3d last = Eigen::Isometry3d::Identity();
@@ -240,7 +240,7 @@ TEST(WindowedOdometry, TakesNoMoreMemoryTheLongerItRuns) {
   SyntheticScene scene(8, 2500, 120.0);
   scene.patches = true;
   VisualOdometryOptions options;
-  options.map.lasting_points = 50;
+  options.map.min_shared_points = 50;
   options.map.remembered_keyframes = 4;  // as many soon
   VisualOdometry odometry(options);
   // Round and round, and once in each round something to be doubted: a stamp that says too little time has passed.

@@ -10,6 +10,12 @@ namespace sdvo::test_rolling_shutter {
 constexpr double kReadout = 0.025, kPeriod = 0.05;  // s
 constexpr double kAcceleration = 1.4;               // rad/s within a second
 
+CalibrationOptions rolling() {
+  CalibrationOptions options;
+  options.readout = kReadout;
+  return options;
+}
+
 Vector6d turning() {
   Vector6d velocity;
   velocity << 0.3, -0.2, 0.8, 0.3, -1.2, 0.5;
@@ -47,7 +53,7 @@ TEST(RollingShutter, TakesTheMiddleRowAtTheStamp) {
   EXPECT_DOUBLE_EQ(rowTime(camera, 0.5 * camera.height - 0.5), 0.0);
   EXPECT_DOUBLE_EQ(rowTime(camera, -0.5), -0.5);
   EXPECT_DOUBLE_EQ(rowTime(camera, camera.height - 0.5), 0.5);
-  EXPECT_FALSE(RollingShutter(0.0, kAcceleration).isRolling());
+  EXPECT_FALSE(RollingShutter({}, kAcceleration).isRolling());
 }
 
 TEST(RollingShutter, MovesPointsToWhereAGlobalOneSeesThem) {
@@ -74,7 +80,7 @@ MotionHypothesis foundIn(const StereoFeatures& global) {
 }
 
 TEST(RollingShutter, RowsShowTheRateAtTheStamp) {
-  const RollingShutter shutter(kReadout, kAcceleration);
+  const RollingShutter shutter(rolling(), kAcceleration);
   Vector6d assumed = turning();
   assumed.tail<3>() += Eigen::Vector3d(0.05, -0.08, 0.04);
   const RolledPair pair{rolled(turning(), kReadout), kReadout, assumed};
@@ -85,7 +91,7 @@ TEST(RollingShutter, RowsShowTheRateAtTheStamp) {
 }
 
 TEST(RollingShutter, FewPointsShowNoRate) {
-  const RollingShutter shutter(kReadout, kAcceleration);
+  const RollingShutter shutter(rolling(), kAcceleration);
   const RolledPair pair{rolled(turning(), kReadout), kReadout, turning()};
   MotionHypothesis found = foundIn(shutter.asGlobal(pair));
   found.sightings.clear(), found.motion.inliers.clear();
@@ -93,7 +99,7 @@ TEST(RollingShutter, FewPointsShowNoRate) {
 }
 
 TEST(RollingShutter, TheVelocityIsBetweenTheMotionsAroundIt) {
-  const RollingShutter shutter(kReadout, kAcceleration);
+  const RollingShutter shutter(rolling(), kAcceleration);
   RolledPair pair;
   EXPECT_EQ(shutter.velocityAt(pair), Vector6d::Zero());
   EXPECT_EQ(shutter.velocityBetween(pair, turning()), turning());
@@ -107,7 +113,7 @@ TEST(RollingShutter, TheVelocityIsBetweenTheMotionsAroundIt) {
 TEST(RollingShutter, WeighsRowsByHowUnevenMotionsAre) {
   const Eigen::Vector3d more(0.1, 0.1, 0.1);
   const auto expected_and_rows = [&](const Vector6d& unevenness) {
-    RollingShutter shutter(kReadout, kAcceleration);
+    RollingShutter shutter(rolling(), kAcceleration);
     RolledPair pair;
     pair.mean_velocity = turning(), pair.mean_velocity_before = turning(), pair.dt = kPeriod;
     for (int k = 0; k < 100; ++k) shutter.learn(pair, turning() + (k % 2 == 0 ? 1.0 : -1.0) * unevenness);

@@ -38,7 +38,7 @@ struct OdometryResult {
   Matrix6d pose_covariance = Matrix6d::Zero();  ///< of a right perturbation: T_origin_camera * exp(xi), m and rad
 
   bool has_motion = false;  ///< false for the first pair and right after a discontinuity
-  double dt = 0.0;          ///< duration of the motion, from the last pose, s; without a motion since the previous pair
+  double dt = 0.0;          ///< s: of the motion, from the last pose; if no motion is known, from the previous pair
   Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
   Matrix6d motion_covariance = Matrix6d::Zero();  ///< of a right perturbation of T_previous_current
   /// Part of the motion that corrects the previous pose in the map: right perturbation like the motion's, m and rad.
@@ -57,7 +57,7 @@ struct OdometryResult {
   double disparity_offset_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
   double disparity_bend = std::numeric_limits<double>::quiet_NaN();  ///< its change at 45 degrees, px; compensated
   double disparity_bend_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
-  double right_delay = std::numeric_limits<double>::quiet_NaN();           ///< right images are later, s; compensated
+  double right_delay = std::numeric_limits<double>::quiet_NaN();           ///< s, beyond the stamps; compensated
   double right_delay_sigma = std::numeric_limits<double>::quiet_NaN();     ///< s
   double readout = std::numeric_limits<double>::quiet_NaN();               ///< of both shutters, first row to last, s
   double readout_sigma = std::numeric_limits<double>::quiet_NaN();         ///< s

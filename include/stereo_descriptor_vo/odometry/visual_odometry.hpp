@@ -22,9 +22,9 @@ class VisualOdometry {
 
   /// Processes the next pair. Stamps must increase, features and guess must pass check(), else std::invalid_argument
   /// and the state is as before. `guess` is one more hypothesis of the motion, never a measurement. A pair's camera
-  /// that isLike() the first one's continues the map; another camera starts a new epoch. A changed camera that
-  /// the images refute is ignored for tracking/max_gap seconds; if it lasts, a new map begins with it in the same
-  /// epoch.
+  /// that isLike() the first one's continues the map; another camera starts a new epoch, unless guesses of the whole
+  /// motion carry the pose there. A changed camera that the images refute is ignored for tracking/max_gap seconds; if
+  /// it lasts, a new map begins with it in the same epoch.
   OdometryResult update(const StereoFeatures& features, const std::optional<MotionGuess>& guess = std::nullopt);
 
   /// Back to the initial pose and a new epoch; nothing is remembered.
@@ -34,10 +34,11 @@ class VisualOdometry {
   /// the pair in its map, else from the last pose under a new epoch.
   void breakStream();
 
-  /// Another source sets the last pose's covariance (right perturbation, m and rad); a new epoch begins. The map is
-  /// kept. After an interruption the next pair starts a map at the last pose instead. Throws std::invalid_argument, and
-  /// changes nothing, when the covariance is not finite or not positive semidefinite.
-  void takePose(const Matrix6d& covariance);
+  /// Another source knows the last pose, with this covariance (right perturbation, m and rad); a new epoch begins. The
+  /// pose itself stays: the caller moves the frame above the origin. The map is kept. After an interruption the next
+  /// pair starts a map at the last pose instead. Throws std::invalid_argument, and changes nothing, when the covariance
+  /// is not finite or not positive semidefinite.
+  void setPoseCovariance(const Matrix6d& covariance);
 
   /// T_origin_camera of the last pair that had a pose.
   const Eigen::Isometry3d& lastPose() const;
