@@ -40,11 +40,11 @@ std::vector<int> sorted(std::vector<int> values) {
 
 using Points = std::vector<Eigen::Vector2d>;  // px, in the left image
 
-/// Mean of the points in each part of the image, because errors of neighbours are correlated.
-Points byParts(const Points& pixels) {
+/// Mean of the points in each square of kCorrelatedSide, because errors of neighbours are correlated.
+Points meansBySquares(const Points& pixels) {
   std::map<std::pair<int, int>, std::pair<Eigen::Vector2d, int>> parts;
   for (const Eigen::Vector2d& pixel : pixels) {
-    const Eigen::Array2i part = (pixel / kPart).array().floor().cast<int>();
+    const Eigen::Array2i part = (pixel / kCorrelatedSide).array().floor().cast<int>();
     auto& [sum, count] = parts.try_emplace({part.x(), part.y()}, Eigen::Vector2d(0.0, 0.0), 0).first->second;
     sum += pixel, ++count;
   }
@@ -64,7 +64,7 @@ double nearest(const Eigen::Vector2d& pixel, const Points& others) {
 /// that miss a motion by errors of rectification or matching lie among the others. Join counts (Cliff and Ord 1973)
 /// against random places.
 bool isObject(const Points& points, const Points& others) {
-  const Points inside = byParts(points), outside = byParts(others);
+  const Points inside = meansBySquares(points), outside = meansBySquares(others);
   if (inside.size() < 2) return false;
   if (outside.empty()) return true;
   const auto joined = std::count_if(inside.begin(), inside.end(), [&](const Eigen::Vector2d& pixel) {
@@ -81,7 +81,7 @@ bool areDivided(const Points& points, const Points& others) {
   constexpr double kWrongInliers = 0.1;  // of either side (chosen): some wrong matches agree by chance
   const auto rowsOf = [](const Points& pixels) {
     std::vector<double> rows;
-    for (const Eigen::Vector2d& part : byParts(pixels)) rows.push_back(part.y());
+    for (const Eigen::Vector2d& part : meansBySquares(pixels)) rows.push_back(part.y());
     return rows;
   };
   const std::vector<double> rows = rowsOf(points), other_rows = rowsOf(others);

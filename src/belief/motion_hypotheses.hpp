@@ -27,7 +27,7 @@ struct Agreement {
 };
 
 /// kUnsuspected: log-odds that a motion is not the camera's, without any evidence (probability of 0.001, chosen).
-/// kCertain: bound of all log-odds (0.999), reached by an event that leaves a wrong map or rig.
+/// kCertain: bound of evidence and doubt (0.999), as nothing is more certain than the model behind it.
 constexpr double kUnsuspected = -6.9, kCertain = -kUnsuspected;
 
 /// Probabilities as log-odds: log(p / (1 - p)).
@@ -55,8 +55,9 @@ struct MotionScene {
   Noise noise{NoiseOptions()};
   std::optional<Eigen::Isometry3d> T_current_reference{};  ///< predicted, or the place's; reference: the newest pair
   std::optional<Eigen::Isometry3d> guess{};                ///< the same from another source than images
-  std::vector<ExpectedMotion> prior{};  ///< mixture for T_reference_current; empty: all motions are equally likely
-  std::optional<PlaceBelief> place{};   ///< where the map was recognised after an outage
+  /// Mixture for T_reference_current: by the confirmed velocity, then by the guess. Empty: all motions are as likely.
+  std::vector<ExpectedMotion> prior{};
+  std::optional<PlaceBelief> place{};  ///< where the map was recognised after an outage
 };
 
 /// A motion that competes for being the camera's, its matches and its rivals.

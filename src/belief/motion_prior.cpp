@@ -57,20 +57,20 @@ std::optional<ExpectedMotion> MotionPrior::priorByConfirmed(std::int64_t stamp, 
   if (!confirmed_) return std::nullopt;
   const double age = static_cast<double>(stamp - confirmed_->stamp) * 1e-9;
   const ExpectedMotion expected{expSE3(confirmed_->value * dt),
-                                processNoise(longest(dt), longest(confirmed_->interval), age) +
+                                processNoise(withStampErrors(dt), withStampErrors(confirmed_->interval), age) +
                                     stampNoise(confirmed_->value) + dt * dt * confirmed_->covariance};
   const double error = std::sqrt(expected.covariance.topLeftCorner<3, 3>().trace());
   return error < options_.max_speed * options_.max_gap ? std::optional(expected) : std::nullopt;
 }
 
 ExpectedMotion MotionPrior::around(const Eigen::Isometry3d& motion, double dt) const {
-  const double time = longest(dt);
+  const double time = withStampErrors(dt);
   return {motion, processNoise(time, time, 0.0)};
 }
 
 double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const {
   if (!last_ || !before_last_) return 0.0;
-  // In the right order the velocities are before, velocity, now. In the wrong one: before, `swapped_first` (the last
+  // In the right order the velocities are before, last, now. In the wrong one: before, `swapped_first` (the last
   // motion and this one, which leads back), -now.
   const Vector6d second = logSE3(motion), now = second / dt;
   const Vector6d swapped_first = last_->value + second / last_->interval;
@@ -105,8 +105,8 @@ Matrix6d MotionPrior::lastStepCovariance(double seconds, double dt) const {
 
 Matrix6d MotionPrior::unmeasuredCovariance() const {
   constexpr double kTurn = 0.5;  // rad (chosen)
-  const double longest = options_.max_speed * options_.max_gap;
-  return isotropic(longest * longest, kTurn * kTurn);
+  const double farthest = options_.max_speed * options_.max_gap;
+  return isotropic(farthest * farthest, kTurn * kTurn);
 }
 
 std::string MotionPrior::tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const {

@@ -73,7 +73,8 @@ class MotionPrior {
   std::string tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const;
 
   /// Takes over the velocity of a motion over `dt` s up to `stamp`, ns. A doubtful motion leaves the confirmed velocity
-  /// as it is. `doubt`: its covariance, m and rad, beyond the measured one, which widens the next prediction.
+  /// as it is, unless there is none. `doubt`: its covariance, m and rad, beyond the measured one, which widens the next
+  /// prediction.
   void takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,
                     bool is_confirmed, const Matrix6d& doubt);
 
@@ -91,8 +92,8 @@ class MotionPrior {
   /// Covariance, m^2 and rad^2, of a motion over `dt` s under white acceleration. Its prediction is a mean velocity
   /// over `before` s, an interval that ended `age` s earlier.
   Matrix6d processNoise(double dt, double before, double age) const;
-  /// s: an interval by two stamps is not longer; the acceleration had so much time.
-  double longest(double dt) const { return dt + 2.0 * options_.stamp_sigma; }
+  /// s: an interval between two stamps is not longer; the acceleration had so much time.
+  double withStampErrors(double dt) const { return dt + 2.0 * options_.stamp_sigma; }
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
   MotionPriorOptions options_;

@@ -286,8 +286,9 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   return OnePair(*this, scene, max_doubt).find();
 }
 
-/// Prior and lasting points do not contradict, and the majority agrees with the motion, all over the image. Lasting
-/// matches that are missing from the share that should agree would be no serious rival even if they moved together.
+/// Prior and lasting points do not contradict, and most confirmed sightings agree with the motion, all over the image.
+/// Lasting matches that are missing from the share that should agree would be no serious rival even if they moved
+/// together.
 bool MotionSearch::isBeyondDoubt(const MotionHypothesis& found, double max_doubt) const {
   if (!found.motion.success || found.innovation > noiseGate(6) || logOddsWrong(found) > max_doubt) return false;
   const double agree = found.agreement.lasting_inliers;

@@ -9,7 +9,8 @@
 namespace sdvo {
 
 /// The covariance to add so that the sum explains a deviation: its outer product, and kTolerableRatio of it in every
-/// direction. Zero if its squared Mahalanobis distance is at most half of the mean (chi-square of six).
+/// direction, as the deviation's own direction errs. Zero if its squared Mahalanobis distance is at most half of the
+/// mean (chi-square of six).
 Matrix6d missingCovariance(const Matrix6d& covariance, const Vector6d& deviation);
 
 /// Covariance of a pose that is reported pair by pair while its map is corrected. All covariances are of right

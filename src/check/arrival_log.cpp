@@ -293,6 +293,7 @@ std::string ArrivalLog::advise(double begin) const {
   }
   // Equal stamps on all topics, and no pair: one side came so late that the queue had dropped the other.
   if (latest->delay <= kLate) return "";
+  // Periods that one side waits (0.01 for rounding), the pair itself, and one to spare.
   return text(2, "; stamps agree, but messages arrive ", latest->delay, " s apart: set sync_queue_size, now ",
               options_.sync_queue_size, ", to at least ",
               static_cast<int>(std::ceil(latest->delay / period() - 0.01)) + 2);

@@ -26,7 +26,7 @@ struct ArrivalFindings {
 
 /// Arrivals on the four inputs of a stereo camera, and the pairs made of them: rates, lateness, order, gaps, and images
 /// that make no pair, with the cause. /diagnostics, the log, check_camera and pages print its findings. Stamps in ns,
-/// 0: none. Times in s of any steady clock. For any thread.
+/// 0: none. Times in s of any steady clock, for checkStamps() of the one that makes the stamps. For any thread.
 class ArrivalLog {
  public:
   enum Input { kLeftImage, kRightImage, kLeftInfo, kRightInfo };
@@ -92,7 +92,7 @@ class ArrivalLog {
   struct Gaps {
     int all = 0, apart = 0, missing = 0;  ///< images; difference beyond what is allowed; beyond half a period
     double least = std::numeric_limits<double>::infinity(), most = 0.0;  ///< of those apart
-    double delay = 0.0;                                                  ///< largest between arrivals of one stamp
+    double delay = 0.0;  ///< largest between arrivals of stamps not apart
   };
 
   double period() const;

@@ -20,8 +20,8 @@ Finding checkMount(const std::string& base_frame, const std::string& camera_fram
 /// side of the robot, and the robot turns about the optical axis.
 class OpticalAxisCheck {
  public:
-  /// `T_before_now`: of the camera since the pair before.
-  void add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now);
+  /// `T_previous_current`: of the camera since the pair before.
+  void add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_previous_current);
 
   Finding judge() const;
 

@@ -25,10 +25,10 @@ namespace sdvo {
 /// A rectified pair of a recording.
 struct RecordedPair {
   StereoCamera camera;
-  cv::Mat left, right;      ///< CV_8U grey; valid as long as the call that it is given to
-  std::int64_t stamp;       ///< ns
-  std::string lens;         ///< the calibration's model in words; empty: unknown
-  std::string unrectified;  ///< evidence that the images are not rectified; empty: none
+  cv::Mat left, right;       ///< CV_8U grey; valid as long as the call that it is given to
+  std::int64_t stamp;        ///< ns
+  std::string lens;          ///< the calibration's model in words; empty: unknown
+  std::string unrectified;   ///< evidence that the images are not rectified; empty: none
   double right_delay = 0.0;  ///< s, of the right image by its stamp, where approximate_sync pairs them
 };
 
@@ -66,7 +66,7 @@ class CameraCheck {
   EmitterCheck emitter_;
   OdometryCheck odometry_;
   RefusalCheck refusals_;
-  std::vector<Eigen::Isometry3d> motions_;  ///< T_before_now of pairs that are TRACKING
+  std::vector<Eigen::Isometry3d> motions_;  ///< T_previous_current of pairs that are TRACKING
   int unusable_ = 0;
   std::string problem_, lens_, unrectified_;
   StereoCamera camera_;

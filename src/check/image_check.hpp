@@ -124,7 +124,7 @@ class ImageCheck {
   ExposureTurns turns_;
   std::vector<double> dark_, bright_, saturated_;  ///< of each pair: mean grey levels, share of white pixels
   std::vector<double> corners_, matched_;          ///< of each pair: number of corners, share found in the right image
-  std::vector<double> sharpness_, moved_;  ///< of each pair after the first: grey levels a px; share of the width
+  std::vector<double> sharpness_, moved_;  ///< of each pair with a common motion: grey levels a px; share of the width
   int lost_views_ = 0;                     ///< pairs without a common motion since the pair before
 };
 

@@ -17,17 +17,17 @@ using Lens = Eigen::Vector4d;  ///< focal length less one, principal point, offs
 struct PairEquations {
   Eigen::Matrix4d information;
   Lens gradient;
-  Vector6d motion;                         ///< at an unchanged lens
+  Vector6d motion;                         ///< at an unchanged lens: rotation, then translation in baselines
   Eigen::Matrix<double, 6, 4> per_change;  ///< the step is motion - per_change * (change of the lens)
 };
 
 template <class Rays>
-PairEquations linearise(const Rays& rays, const Lens& lens, const Eigen::Isometry3d& T_before_now) {
+PairEquations linearise(const Rays& rays, const Lens& lens, const Eigen::Isometry3d& T_previous_current) {
   constexpr double kLeastScale = 1e-4;  // rad (chosen): less than any tracker's error
   const double f = 1.0 + lens[0];
   const Eigen::Vector2d centre = lens.segment<2>(1);
-  const Eigen::Matrix3d R = T_before_now.linear();
-  const Eigen::Vector3d t = T_before_now.translation();  // in baselines
+  const Eigen::Matrix3d R = T_previous_current.linear();
+  const Eigen::Vector3d t = T_previous_current.translation();  // in baselines
   std::vector<Eigen::Vector2d> residuals;
   std::vector<Eigen::Matrix<double, 2, 10>> jacobians;
   std::vector<double> norms;

@@ -8,9 +8,9 @@ namespace sdvo {
 /// Whether a base drives along the floor as the camera's mount on TF has it.
 class MountCheck {
  public:
-  /// `T_before_now`: of the camera since the pair before. Another mount begins anew.
-  void add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now) {
-    tilt_.add(T_base_camera, T_before_now);
+  /// `T_previous_current`: of the camera since the pair before. Another mount begins anew.
+  void add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_previous_current) {
+    tilt_.add(T_base_camera, T_previous_current);
   }
 
   /// `tilt_sigma`: deg, as the mount is trusted beforehand.

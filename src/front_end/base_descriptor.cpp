@@ -117,7 +117,7 @@ class OpenCvDescriptor : public BaseDescriptor {
 
  private:
   cv::Ptr<cv::Feature2D> feature_;
-  double reach_per_size_;
+  double reach_per_size_;  ///< half of the pattern that OpenCV samples around a key point, in its sizes
   Impose impose_;
 };
 

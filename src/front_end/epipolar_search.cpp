@@ -111,15 +111,15 @@ float EpipolarSearch::findPeriod(const cv::Point2f& left_position, double dispar
   const int x = cvRound(0.5f * left_position.x - 0.25f), y = cvRound(0.5f * left_position.y - 0.25f);
   const std::uint8_t* block = images_.left_half.ptr(y + kMargin) + x + kMargin;
   const int most = static_cast<int>(0.5 * std::max(max_disparity_ - disparity, disparity));
-  const int columns = images_.left_half.cols - 2 * kMargin, right = std::min(most, columns - 1 - x);
-  const int count = right + std::min(most, x) + 1;
+  const int columns = images_.left_half.cols - 2 * kMargin, to_right = std::min(most, columns - 1 - x);
+  const int count = to_right + std::min(most, x) + 1;
   if (count < 3) return 0.f;
   thread_local std::vector<unsigned> differences;
   differences.resize(static_cast<std::size_t>(count));
-  blockDifferences<kHalfRows>(block, block + right, static_cast<std::ptrdiff_t>(images_.left_half.step[0]), count,
+  blockDifferences<kHalfRows>(block, block + to_right, static_cast<std::ptrdiff_t>(images_.left_half.step[0]), count,
                               differences.data());
-  const int shift = 2 * (lowestValley(differences, right).at - right);
-  if (shift > 2 * most) return 0.f;  // no valley
+  // Without a valley it is the end of the range, where refine() finds nothing but a period.
+  const int shift = 2 * (lowestValley(differences, to_right).at - to_right);
   const std::optional<cv::Point2f> place = refine(images_.left, left_position, shift);
   return place && std::abs(place->y) <= options_.max_epipolar_residual ? std::abs(place->x) : 0.f;
 }
@@ -157,7 +157,7 @@ std::optional<cv::Point2f> EpipolarSearch::refine(const cv::Mat& other, const cv
   return align(other, left_position, searchAround(other, left, disparity));
 }
 
-cv::Point2f EpipolarSearch::searchAround(const cv::Mat& right, const cv::Point& left, int disparity) const {
+cv::Point2f EpipolarSearch::searchAround(const cv::Mat& other, const cv::Point& left, int disparity) const {
   constexpr int kReach = 2;
   const int rows = std::min(2, static_cast<int>(std::ceil(options_.max_epipolar_residual)));
   const std::uint8_t* block = images_.left.ptr(left.y + kMargin) + left.x + kMargin;
@@ -165,12 +165,12 @@ cv::Point2f EpipolarSearch::searchAround(const cv::Mat& right, const cv::Point& 
   cv::Point2f best;
   unsigned least = std::numeric_limits<unsigned>::max();
   for (int dv = -rows; dv <= rows; ++dv) {
-    const std::uint8_t* other = right.ptr(left.y + dv + kMargin) + left.x - disparity + kReach + kMargin;
+    const std::uint8_t* around = other.ptr(left.y + dv + kMargin) + left.x - disparity + kReach + kMargin;
     unsigned differences[2 * kReach + 1];
-    blockDifferences<kFullRows>(block, other, step, 2 * kReach + 1, differences);
+    blockDifferences<kFullRows>(block, around, step, 2 * kReach + 1, differences);
     for (int k = 0; k <= 2 * kReach; ++k) {
       const int d = disparity - kReach + k;
-      if (left.x - d < 0 || left.x - d > right.cols - 2 * kMargin) continue;
+      if (left.x - d < 0 || left.x - d > other.cols - 2 * kMargin) continue;
       if (differences[k] >= least) continue;
       least = differences[k];
       const float between = k > 0 && k < 2 * kReach ? valleyBetween(differences + k - 1) : 0.f;
@@ -183,7 +183,7 @@ cv::Point2f EpipolarSearch::searchAround(const cv::Mat& right, const cv::Point& 
 /// Inverse compositional alignment (Baker and Matthews 2004) of (disparity, dv, slant), blind to a difference of
 /// brightness. On the ground in front of a vehicle, disparities grow by a third of a pixel from row to row: without
 /// the slant, the result would be half a pixel off there.
-std::optional<cv::Point2f> EpipolarSearch::align(const cv::Mat& right, const cv::Point2f& left_position,
+std::optional<cv::Point2f> EpipolarSearch::align(const cv::Mat& other, const cv::Point2f& left_position,
                                                  const cv::Point2f& start) const {
   constexpr int kIterations = 10;
   constexpr float kConverged = 0.03f, kNextConverged = 0.015f;  // px, of a step and of what would be the next one
@@ -207,7 +207,7 @@ std::optional<cv::Point2f> EpipolarSearch::align(const cv::Mat& right, const cv:
   float slant = 0.f, step_before = 0.f;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     Eigen::Vector3f gradient =
-        patch.compare(right, kMargin, left_position.x - found.x, left_position.y + found.y, slant);
+        patch.compare(other, kMargin, left_position.x - found.x, left_position.y + found.y, slant);
     gradient[2] -= kUpright * slant;
     Eigen::Vector3f step;
     for (int i = 0; i < 3; ++i) step[i] = sumOfProducts(inverse.col(i), gradient);
@@ -217,8 +217,8 @@ std::optional<cv::Point2f> EpipolarSearch::align(const cv::Mat& right, const cv:
     const cv::Point2f correction = found - start;
     if (!(std::max(std::abs(correction.x), std::abs(correction.y)) <= kLargestCorrection)) return std::nullopt;
     if (!(std::abs(slant) <= kSteepest)) return std::nullopt;
-    const float u_right = left_position.x - found.x;
-    if (u_right < 0.f || u_right > static_cast<float>(right.cols - 2 * kMargin - 1)) return std::nullopt;
+    const float u_other = left_position.x - found.x;
+    if (u_other < 0.f || u_other > static_cast<float>(other.cols - 2 * kMargin - 1)) return std::nullopt;
     // Convergence is linear: the next step has about the length square / previous.
     const float length = std::max(std::abs(step[0]), std::abs(step[1]));
     if (length < kConverged || length * length < kNextConverged * step_before) break;

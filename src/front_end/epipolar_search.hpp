@@ -41,8 +41,8 @@ class EpipolarSearch {
   std::optional<RowMatch> searchRow(const cv::Point2f& left_position) const;
   /// (disparity, dv) in the right image, or in another one, from a disparity to 2 px.
   std::optional<cv::Point2f> refine(const cv::Mat& other, const cv::Point2f& left_position, int disparity) const;
-  cv::Point2f searchAround(const cv::Mat& right, const cv::Point& left, int disparity) const;
-  std::optional<cv::Point2f> align(const cv::Mat& right, const cv::Point2f& left_position,
+  cv::Point2f searchAround(const cv::Mat& other, const cv::Point& left, int disparity) const;
+  std::optional<cv::Point2f> align(const cv::Mat& other, const cv::Point2f& left_position,
                                    const cv::Point2f& start) const;
 
   const StereoMatcherOptions& options_;

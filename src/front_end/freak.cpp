@@ -19,23 +19,23 @@ std::array<Freak::Field, Freak::kFields> makePattern() {
   constexpr int kRings = 8;
   constexpr int kFieldsOfRing[kRings] = {6, 6, 6, 6, 6, 6, 6, 1};
   constexpr double kOuter = 2.0 / 3.0, kInner = 2.0 / 24.0, kUnit = (kOuter - kInner) / 21.0;
-  constexpr double kRadius[kRings] = {kOuter,
-                                      kOuter - 6 * kUnit,
-                                      kOuter - 11 * kUnit,
-                                      kOuter - 15 * kUnit,
-                                      kOuter - 18 * kUnit,
-                                      kOuter - 20 * kUnit,
-                                      kInner,
-                                      0.0};
+  constexpr double kRingRadii[kRings] = {kOuter,
+                                         kOuter - 6 * kUnit,
+                                         kOuter - 11 * kUnit,
+                                         kOuter - 15 * kUnit,
+                                         kOuter - 18 * kUnit,
+                                         kOuter - 20 * kUnit,
+                                         kInner,
+                                         0.0};
   std::array<Freak::Field, Freak::kFields> fields{};
   std::size_t next = 0;
   for (int ring = 0; ring < kRings; ++ring) {
-    const double sigma = kRadius[std::min(ring, kRings - 2)] / 2.0;
+    const double sigma = kRingRadii[std::min(ring, kRings - 2)] / 2.0;
     for (int k = 0; k < kFieldsOfRing[ring]; ++k) {
       // Every second ring is turned by half a step, so that the fields interlace.
       const double alpha = CV_2PI * k / kFieldsOfRing[ring] + (ring % 2) * CV_PI / 6.0;
-      fields[next++] = {static_cast<float>(kRadius[ring] * std::cos(alpha)),
-                        static_cast<float>(kRadius[ring] * std::sin(alpha)), static_cast<float>(sigma)};
+      fields[next++] = {static_cast<float>(kRingRadii[ring] * std::cos(alpha)),
+                        static_cast<float>(kRingRadii[ring] * std::sin(alpha)), static_cast<float>(sigma)};
     }
   }
   return fields;

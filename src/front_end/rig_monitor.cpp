@@ -10,7 +10,7 @@
 namespace sdvo {
 namespace {
 
-constexpr int kEnough = 25;    // corners found that a judgement needs: half of those that must be looked for
+constexpr int kEnough = 25;    // corners (chosen): detected ones for a suspicion, found ones for a judgement
 constexpr int kAgreeing = 12;  // corners on one line of rows: a wrong match lies there with a probability of 6 %
 
 double distanceFrom(const RowLine& rows, const FoundCorner& corner) {

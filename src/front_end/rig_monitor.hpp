@@ -26,7 +26,7 @@ struct RowLine {
 
 /// The monitor's diagnosis of a pair.
 struct RigDiagnosis {
-  std::string words;            ///< the likely cause; empty if the rig is in order, or if too few corners are found
+  std::string words;  ///< the likely cause, or that all is too near; empty otherwise, or if too few corners are found
   std::optional<RowLine> rows;  ///< of a rig whose only fault is that its rows differ
   bool too_near = false;        ///< a part of the scene is nearer than `max_disparity` reaches
   bool refused = false;         ///< left and right do not belong together

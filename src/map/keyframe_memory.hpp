@@ -10,7 +10,7 @@
 
 namespace sdvo {
 
-/// A key frame that left the local map, with its points as they were estimated then.
+/// A key frame that is none of the newest any more, with its points as they were estimated then.
 struct OldKeyframe {
   struct Point {
     AnchoredPoint position;
@@ -26,8 +26,8 @@ struct OldKeyframe {
   int sharedWith(const StereoCamera& camera, const Eigen::Isometry3d& T_other_origin) const;
 };
 
-/// Key frames that left the map, for a camera that comes back to their places. Beyond the capacity the one that is
-/// farthest from the newest one is forgotten.
+/// Such key frames, for a camera that comes back to their places. The map may still have some of them. Beyond the
+/// capacity the one that is farthest from the newest one is forgotten.
 class KeyframeMemory {
  public:
   explicit KeyframeMemory(int capacity) : capacity_(capacity) {}

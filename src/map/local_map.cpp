@@ -231,7 +231,7 @@ void LocalMap::rememberKeyframe(const Frame& frame) {
   if (options_.remembered_keyframes == 0 || frame.is_recalled) return;
   OldKeyframe old = keyframe(frame);
   // With fewer points it could not be recalled.
-  if (old.described.count() >= options_.lasting_points) memory_.remember(camera_, std::move(old));
+  if (old.described.count() >= options_.min_shared_points) memory_.remember(camera_, std::move(old));
 }
 
 /// Removes key frames that are older than the `keyframes` newest ones: the oldest that shares too few points with the
@@ -242,7 +242,7 @@ void LocalMap::forgetKeyframe() {
   rememberKeyframe(frames_[older() - 1]);
   const std::vector<int> shared = sharedPoints();
   const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(older()),
-                                    [&](int points) { return points < options_.lasting_points; });
+                                    [&](int points) { return points < options_.min_shared_points; });
   const std::size_t unshared = static_cast<std::size_t>(too_few - shared.begin());
   if (unshared < older()) removeFrame(unshared);
   while (static_cast<int>(older()) > options_.keyframes) {
@@ -271,7 +271,7 @@ OldKeyframe LocalMap::keyframe(const Frame& frame) const {
 const OldKeyframe* LocalMap::revisited() const {
   const auto is_recalled = [](const Frame& frame) { return frame.is_recalled; };
   if (std::any_of(frames_.begin(), frames_.end(), is_recalled)) return nullptr;
-  const OldKeyframe* nearest = memory_.nearest(camera_, newestPose(), options_.lasting_points);
+  const OldKeyframe* nearest = memory_.nearest(camera_, newestPose(), options_.min_shared_points);
   const auto is_here = [&](const Frame& frame) { return frame.id == nearest->id; };
   return nearest && std::none_of(frames_.begin(), frames_.end(), is_here) ? nearest : nullptr;
 }

@@ -19,6 +19,9 @@
 namespace sdvo {
 
 /// The points around the camera and the key frames that saw them. The next pair's motion is measured against it.
+///
+/// A pair joins it by these calls: view() and sight() for the search of its motion, insert(), recall() if it came back
+/// to an old key frame, adjust(), noteVariance(), renewAppearance(), and discountNewest() for a doubtful motion.
 class LocalMap {
  public:
   explicit LocalMap(const LocalMapOptions& options);
@@ -53,7 +56,7 @@ class LocalMap {
     /// (u_left, v_left, disparity without the rig's error) in the newest pair, px. A point that the next motion brings
     /// into view is outside of its image.
     std::vector<cv::Point3f> pixels;
-    std::vector<int> ids;     ///< Sighting::point
+    std::vector<int> ids;     ///< Sighting::point: indices in the map, which insert() changes
     std::vector<int> seen;    ///< number of confirmed pairs that saw the point, also of those that left the map
     std::vector<int> newest;  ///< feature of the newest pair that saw the point; -1 for none
   };
@@ -68,7 +71,7 @@ class LocalMap {
   struct Sighting : Observation {
     int point, feature;
     bool aligned = false;  ///< the position was found by aligning the reference patch; it is not the corner's
-    double scale = 1.0;    ///< how much larger the point appears than in its reference patch
+    double scale = 1.0;    ///< how much larger the point appears than in its reference patch; see recall() for links
   };
 
   /// The sighting of a point by the feature that was matched with it; the pair was seen from about `T_camera_origin`.
@@ -92,19 +95,22 @@ class LocalMap {
   const OldKeyframe* revisited() const;
 
   /// Inserts an old key frame into the map again. `links`: sightings of its points in the newest pair, which become its
-  /// observations of the newest pair's points.
+  /// observations of the newest pair's points. Their `point` is an index in `old`, their `scale` relative to `old`.
   void recall(const OldKeyframe& old, const std::vector<Sighting>& links);
 
-  /// Moves the whole map rigidly, so that its newest pair has the pose T_newest_origin.
+  /// Moves the whole map rigidly, so that its newest pair has the pose T_newest_origin. Remembered key frames stay: the
+  /// map drifted away from them.
   void moveTo(const Eigen::Isometry3d& T_newest_origin);
 
   /// Result of adjust().
   struct Adjustment {
     bool success = false;
-    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the motion from the last key frame
-    /// By how much the covariance of the newest pose, relative to the window's first one, exceeds the key frame's.
+    /// Covariance of the motion from the last key frame before the newest pair (right perturbation, m and rad).
+    Matrix6d since_keyframe = Matrix6d::Zero();
+    /// By how much the covariance of the newest pose, relative to the window's first one, exceeds the key frame's; in
+    /// the newest pair's axes.
     Matrix6d growth = Matrix6d::Zero();
-    /// Derivative of the motion from the last key frame by the calibration, m/px and rad/px.
+    /// Derivative of that motion by the calibration, m/px and rad/px.
     RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
@@ -112,7 +118,8 @@ class LocalMap {
     double newest_square = 0.0;  ///< median of the newest pair's squared residuals, in standard deviations
     int newest_measured = 0;     ///< number of these residuals
   };
-  /// Bundle adjustment over all frames. Outliers among the newest pair's observations are removed from their points.
+  /// Bundle adjustment over all frames, which begins and ends with `calibration`. Outliers among the newest pair's
+  /// observations are removed from their points.
   Adjustment adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior, RigCalibration& calibration,
                     const std::optional<Floor>& floor = std::nullopt);
 

@@ -29,13 +29,13 @@ double MountTilt::Sums::variance(const Eigen::Vector2d& normal) const {
   return std::max(residuals, 0.0) / std::max(count - 2, 1);
 }
 
-void MountTilt::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now) {
+void MountTilt::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_previous_current) {
   if (!T_base_camera.isApprox(T_base_camera_, 1e-6)) {
     translations_ = rotations_ = {};
     distance_ = 0.0;
   }
   T_base_camera_ = T_base_camera;
-  const Eigen::Isometry3d of_base = T_base_camera * T_before_now * T_base_camera.inverse();
+  const Eigen::Isometry3d of_base = T_base_camera * T_previous_current * T_base_camera.inverse();
   const Eigen::Vector3d t = of_base.translation(), turn = logSO3(of_base.linear());
   if (t.norm() > kLeast * height_sigma_) translations_.add(t.head<2>(), -t.z());  // along the floor
   distance_ += t.norm();

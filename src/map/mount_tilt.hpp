@@ -19,8 +19,8 @@ class MountTilt {
 
   explicit MountTilt(const PlanarOptions& options);
 
-  /// `T_before_now`: of the camera since the pair before. Another mount begins anew.
-  void add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now);
+  /// `T_previous_current`: of the camera since the pair before. Another mount begins anew.
+  void add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_previous_current);
 
   /// `sigma`: rad, of each tilt as the mount is trusted beforehand.
   Estimate estimate(double sigma) const;

@@ -196,7 +196,7 @@ struct AddPoint {
     // With poses x, the point p and the calibration c, the equations have the blocks H_xx, H_xp, H_pp and so on.
     // 1. Sum over the observations, a lane for each number of p or c: H_pp, H_cp, H_cc and the gradients. H_xx and H_xc
     // are added to the equations at once; H_xp = J_pose^T W J_point is kept in the factors.
-    DoubleLanes of_H[3] = {}, of_g = {}, of_both[3] = {}, of_disparity = {}, of_shapes[3] = {}, of_shape = {};
+    DoubleLanes sum_pp[3] = {}, sum_p = {}, sum_cp[3] = {}, sum_dp = {}, sum_cc[3] = {}, sum_c = {};
     double weight = 0.0, disparity_residual = 0.0;
     int observations = 0, count = 0;
     for (int i = 0; i < point->count; ++i) {
@@ -213,13 +213,13 @@ struct AddPoint {
       for (int m = 0; m < 3; ++m) load(J.by_point[m], row[m]);
       load(shape, shapes);
       for (int k = 0; k < 3; ++k) {
-        for (int m = 0; m < 3; ++m) of_H[k] += row[m] * J.by_point[m][k];
-        of_g += row[k] * residual[k];
-        of_both[k] += shapes * J.by_point[2][k];
-        of_shapes[k] += shapes * shape[k];
+        for (int m = 0; m < 3; ++m) sum_pp[k] += row[m] * J.by_point[m][k];
+        sum_p += row[k] * residual[k];
+        sum_cp[k] += shapes * J.by_point[2][k];
+        sum_cc[k] += shapes * shape[k];
       }
-      of_shape += shapes * residual[2];
-      of_disparity += row[2] * root;
+      sum_c += shapes * residual[2];
+      sum_dp += row[2] * root;
       weight += w;
       disparity_residual += root * residual[2];
       ++observations;
@@ -229,38 +229,36 @@ struct AddPoint {
       multiply(J.by_pose[0], J.by_point, factor.Y.data());
       factor.gradient.setZero();
       addTimes<1>(J.by_pose[0], residual, factor.gradient.data());
-      SpreadColumns(J.by_pose[0]).addProduct<1>(J.by_pose[0], equations->ofPoses(factor.pose, factor.pose));
-      addProduct<1, 1>(shape, J.by_pose[2], equations->of_both_[factor.pose].values);
+      SpreadColumns(J.by_pose[0]).addProduct<1>(J.by_pose[0], equations->H_xx(factor.pose, factor.pose));
+      addProduct<1, 1>(shape, J.by_pose[2], equations->H_cx_[factor.pose].values);
     }
-    double H[3][kLanes], g[kLanes], by_calibration[3][kLanes], of_calibration[kLanes], disparity_by_point[kLanes];
-    double calibration[3][kLanes];
-    for (int k = 0; k < 3; ++k)
-      store(of_H[k], H[k]), store(of_both[k], by_calibration[k]), store(of_shapes[k], calibration[k]);
-    store(of_g, g), store(of_shape, of_calibration), store(of_disparity, disparity_by_point);
+    double H_pp[3][kLanes], g_p[kLanes], H_cp[3][kLanes], g_c[kLanes], disparity_by_point[kLanes];
+    double H_cc[3][kLanes];
+    for (int k = 0; k < 3; ++k) store(sum_pp[k], H_pp[k]), store(sum_cp[k], H_cp[k]), store(sum_cc[k], H_cc[k]);
+    store(sum_p, g_p), store(sum_c, g_c), store(sum_dp, disparity_by_point);
 
     // 2. Factor H_pp, damped: R = L^-1. `reduced` is R g_p.
     const double baseline = projection->camera.baseline;
     const double least[3] = {kLeastInformation, kLeastInformation, kLeastInformation * baseline * baseline};
-    for (int k = 0; k < 3; ++k) H[k][k] = H[k][k] * (1.0 + linearisation->damping) + least[k];
+    for (int k = 0; k < 3; ++k) H_pp[k][k] = H_pp[k][k] * (1.0 + linearisation->damping) + least[k];
     double R[3][3];
-    invertRoot(H, least, R);
+    invertRoot(H_pp, least, R);
     const double transposed[3][kLanes] = {{R[0][0], R[1][0], R[2][0]}, {0.0, R[1][1], R[2][1]}, {0.0, 0.0, R[2][2]}};
     double reduced[3], reduced_calibration[3][kLanes] = {};
     for (int k = 0; k < 3; ++k) {
-      reduced[k] = R[k][0] * g[0] + R[k][1] * g[1] + R[k][2] * g[2];
+      reduced[k] = R[k][0] * g_p[0] + R[k][1] * g_p[1] + R[k][2] * g_p[2];
       for (int l = 0; l < kCalibration; ++l)
-        reduced_calibration[k][l] =
-            R[k][0] * by_calibration[0][l] + R[k][1] * by_calibration[1][l] + R[k][2] * by_calibration[2][l];
+        reduced_calibration[k][l] = R[k][0] * H_cp[0][l] + R[k][1] * H_cp[1][l] + R[k][2] * H_cp[2][l];
     }
     // 3. Schur complement: subtract H_cp H_pp^-1 H_pc and H_cp H_pp^-1 g_p, with H_pp^-1 = R^T R.
     const Eigen::Index tail = equations->gradient_.size() - kCalibration;
     for (int k = 0; k < kCalibration; ++k) {
       for (int m = 0; m < 3; ++m) {
-        of_calibration[k] -= reduced_calibration[m][k] * reduced[m];
-        for (int l = 0; l <= k; ++l) calibration[k][l] -= reduced_calibration[m][k] * reduced_calibration[m][l];
+        g_c[k] -= reduced_calibration[m][k] * reduced[m];
+        for (int l = 0; l <= k; ++l) H_cc[k][l] -= reduced_calibration[m][k] * reduced_calibration[m][l];
       }
-      equations->gradient_[tail + k] += of_calibration[k];
-      for (int l = 0; l <= k; ++l) equations->of_calibration_(k, l) += calibration[k][l];
+      equations->gradient_[tail + k] += g_c[k];
+      for (int l = 0; l <= k; ++l) equations->H_cc_(k, l) += H_cc[k][l];
     }
 
     // 4. The same for poses: Y = H_xp R^T, and subtract the products of the Y of each two poses, Y R H_pc and Y R g_p.
@@ -269,19 +267,19 @@ struct AddPoint {
       double* Y = factor.Y.data();
       multiply(Y, transposed, Y);
       addTimes<-1>(Y, reduced, factor.gradient.data());
-      addProduct<3, -1>(reduced_calibration[0], Y, equations->of_both_[factor.pose].values);
+      addProduct<3, -1>(reduced_calibration[0], Y, equations->H_cx_[factor.pose].values);
       for (int i = 0; i < 6; ++i) equations->gradient_[6 * factor.pose + i] += factor.gradient[i];
     }
     for (int other = 0; other < count; ++other) {
       const SpreadColumns columns(factors[other].Y.data());
       for (int k = other; k < count; ++k)
-        columns.addProduct<-1>(factors[k].Y.data(), equations->ofPoses(factors[k].pose, factors[other].pose));
+        columns.addProduct<-1>(factors[k].Y.data(), equations->H_xx(factors[k].pose, factors[other].pose));
     }
 
     for (int k = 0; k < 3; ++k) {
       for (int l = 0; l < 3; ++l) result->R(k, l) = R[k][l], result->by_calibration(l, k) = reduced_calibration[k][l];
       result->gradient[k] = reduced[k];
-      result->calibration_gradient[k] = of_calibration[k];
+      result->calibration_gradient[k] = g_c[k];
       result->disparity_by_point[k] = disparity_by_point[k];
     }
     result->factors = count, result->observations = observations;
@@ -315,9 +313,9 @@ void sumGradients(const std::vector<EliminatedPoint>& points, const std::vector<
 }
 
 void PoseEquations::setZero(int poses) {
-  of_poses_.assign(static_cast<std::size_t>(poses * (poses + 1) / 2), {});
-  of_both_.assign(static_cast<std::size_t>(poses), {});
-  of_calibration_.setZero();
+  H_xx_.assign(static_cast<std::size_t>(poses * (poses + 1) / 2), {});
+  H_cx_.assign(static_cast<std::size_t>(poses), {});
+  H_cc_.setZero();
   gradient_.setZero(6 * poses + kCalibration);
 }
 
@@ -329,17 +327,18 @@ EliminatedPoint PoseEquations::add(const WindowProjection& projection, const Obs
 }
 
 void PoseEquations::writeHessian(Eigen::MatrixXd& hessian) const {
-  const Eigen::Index poses = static_cast<Eigen::Index>(of_both_.size());
+  const Eigen::Index poses = static_cast<Eigen::Index>(H_cx_.size());
   hessian.setZero(gradient_.size(), gradient_.size());
-  const PoseBlock* block = of_poses_.data();
+  const PoseBlock* block = H_xx_.data();
   for (Eigen::Index row = 0; row < poses; ++row)
     for (Eigen::Index column = 0; column <= row; ++column, ++block)
       hessian.block<6, 6>(6 * row, 6 * column) = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(block->values);
   for (Eigen::Index pose = 0; pose < poses; ++pose)
     hessian.block<kCalibration, 6>(6 * poses, 6 * pose) =
-        Eigen::Map<const Eigen::Matrix<double, 4, 6>>(of_both_[static_cast<std::size_t>(pose)].values)
+        Eigen::Map<const Eigen::Matrix<double, CalibrationBlock::kRows, 6>>(
+            H_cx_[static_cast<std::size_t>(pose)].values)
             .topRows<kCalibration>();
-  hessian.bottomRightCorner<kCalibration, kCalibration>() = of_calibration_;
+  hessian.bottomRightCorner<kCalibration, kCalibration>() = H_cc_;
 }
 
 }  // namespace sdvo

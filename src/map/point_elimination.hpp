@@ -93,21 +93,22 @@ class PoseEquations {
 
  private:
   friend struct AddPoint;
-  /// Column by column, contiguous. Rows beyond the calibration's are not used.
+  /// Column by column, contiguous.
   struct PoseBlock {
     double values[6 * 6];
   };
+  /// The same; rows beyond the calibration's fill a register of doubles.
   struct CalibrationBlock {
-    double values[6 * 4];
+    static constexpr int kRows = 4;
+    static_assert(kCalibration <= kRows, "a column is one register");
+    double values[6 * kRows];
   };
 
-  double* ofPoses(int row, int column) {
-    return of_poses_[static_cast<std::size_t>(row * (row + 1) / 2 + column)].values;
-  }
+  double* H_xx(int row, int column) { return H_xx_[static_cast<std::size_t>(row * (row + 1) / 2 + column)].values; }
 
-  std::vector<PoseBlock> of_poses_;        ///< lower triangle, row by row
-  std::vector<CalibrationBlock> of_both_;  ///< calibration and each pose
-  RigCalibration::Matrix of_calibration_;
+  std::vector<PoseBlock> H_xx_;         ///< lower triangle, row by row
+  std::vector<CalibrationBlock> H_cx_;  ///< calibration and each pose
+  RigCalibration::Matrix H_cc_;
   Eigen::VectorXd gradient_;
 };
 

@@ -62,7 +62,7 @@ std::vector<ExpectedPoint> expectedPoints(const DescribedPoints& map, const Ster
 }
 
 /// The points that are no inliers of a view's motion.
-DescribedPoints withoutMatches(const DescribedPoints& points, const ViewMatch& view) {
+DescribedPoints withoutInliers(const DescribedPoints& points, const ViewMatch& view) {
   const std::vector<bool> used = inliersOf(view, points);
   DescribedPoints others;
   others.kind = points.kind;
@@ -124,7 +124,7 @@ std::optional<FoundPlace> Reacquisition::find(const LocalMap& map, const StereoF
   if (!found) return std::nullopt;
   FoundPlace place{found->view.motion.T_current_reference, found->chance, std::nullopt};
   // Doors of a corridor, or shelves: if the other points match as well, at another motion, the structure is repeated.
-  const DescribedPoints others = withoutMatches(points, found->view);
+  const DescribedPoints others = withoutInliers(points, found->view);
   const auto second = match(others, others, features, calibration);
   if (second) place.alike = second->view.motion.T_current_reference;
   return place;
@@ -155,7 +155,7 @@ bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calib
     links.push_back({{seen, found->sigma}, match.reference, match.current, true, scale});
     aligned.push_back({then, measurement});
   }
-  if (static_cast<int>(links.size()) < map.options().lasting_points) return false;
+  if (static_cast<int>(links.size()) < map.options().min_shared_points) return false;
   refineMotion(features.camera, motion_options_, aligned, motion.T_current_reference);
   // If no motion fits so well, the rectification errs differently over the image, and a link would bend the map.
   constexpr double kSameWorld = 0.3;  // px, median (chosen; up to 0.25 where rectification is exact)

@@ -15,7 +15,7 @@ namespace {
 /// estimate follows the part f of that error; with the noise of positions, the residual has (1 - f) of its variance.
 /// None if f is more than half.
 std::optional<double> commonSquare(const EliminatedPoint& point) {
-  constexpr int kFewest = 4;
+  constexpr int kFewest = 4;  // observations (chosen): the mean of fewer is mostly noise
   if (point.observations < kFewest) return std::nullopt;
   // Ratio of a common disparity error that the point's position takes over.
   const double followed = (point.R * point.disparity_by_point).squaredNorm() / point.weight;
@@ -221,6 +221,7 @@ class WindowOptimizer::Solver {
     solved_ = factor_.solve(units_);
     const RigCalibration::Matrix of_calibration = solved_.bottomRightCorner<kCalibration, kCalibration>();
     const RigCalibration::Matrix information = of_calibration.inverse();
+    // Of the normal equations themselves, without `bread`: CalibrationFilter::kRealInformation scales it.
     solution_.calibration_information = (information - window_->calibration_prior.information) / bread;
     solution_.pose_by_calibration =
         units_.leftCols(asked).transpose() * solved_.rightCols<kCalibration>() * information;
@@ -281,7 +282,7 @@ class WindowOptimizer::Solver {
   /// areas of two and four times the width are tried, and the largest sum counts.
   double meatOf(const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
     constexpr int kSide = 64;  // clusters along each axis at most
-    const double scale = window_->camera.fx / kPart;
+    const double scale = window_->camera.fx / kCorrelatedSide;
     const auto index = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kSide / 2), 0, kSide - 1); };
     gradients_.resize(points_.size());
     sumGradients(points_, factors_, by, gradients_);

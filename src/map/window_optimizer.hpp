@@ -24,7 +24,7 @@ struct Window {
   StereoCamera camera;
   std::vector<Eigen::Isometry3d> T_camera_origin;  ///< the first one is held fixed
   std::vector<AnchoredPoint> points;
-  std::vector<WindowObservation> observations;  ///< sorted by point
+  std::vector<WindowObservation> observations;  ///< sorted by point, then by frame
   RigCalibration calibration;
   CalibrationBelief calibration_prior;
   std::optional<Floor> floor;  ///< constrains the base of every pose but the first

@@ -83,7 +83,7 @@ struct Template {
   Eigen::Matrix2f hessian;
 };
 
-bool makeTemplate(const NearPatch& reference, const Eigen::Vector2f& centre, const SampleSquare& square,
+bool makeTemplate(const PaddedPatch& reference, const Eigen::Vector2f& centre, const SampleSquare& square,
                   Template& result) {
   constexpr float kFlat = 1.f;  // grey level: less contrast than this is noise
   // Least determinant of the hessian, per product of its diagonal: an edge does not constrain the position along it.
@@ -114,7 +114,7 @@ std::optional<PatchShift> alignPatch(const NoiseOptions& noise, const Patch& ref
   constexpr float kConverged = 0.02f;        // samples
   constexpr float kLeastCorrelation = 0.7f;  // of the aligned patches
   static const SampleSquare square;
-  thread_local NearPatch near_reference, near_current;
+  thread_local PaddedPatch near_reference, near_current;
   near_reference.take(reference), near_current.take(current);
   Template pattern;
   if (!makeTemplate(near_reference, centre, square, pattern)) return std::nullopt;

@@ -89,14 +89,14 @@ SampleSquare::SampleSquare() {
     }
 }
 
-void NearPatch::take(const Patch& patch) {
+void PaddedPatch::take(const Patch& patch) {
   const std::size_t bytes = static_cast<std::size_t>(patch.side * patch.side);
   samples_.resize(bytes + static_cast<std::size_t>(patch.side + 2 * kRow));
   std::copy_n(patch.samples, bytes, samples_.begin());
   side_ = patch.side;
 }
 
-bool SampleSquare::sample(const NearPatch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
+bool SampleSquare::sample(const PaddedPatch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
                           Samples& values) const {
   const float half = 0.5f * static_cast<float>(patch.side() - 1);
   const Eigen::Vector2f reach = static_cast<float>(kAlignedRadius) * grid.cwiseAbs().rowwise().sum();
@@ -106,8 +106,8 @@ bool SampleSquare::sample(const NearPatch& patch, const Eigen::Vector2f& centre,
   return true;
 }
 
-bool SampleSquare::sampleUpright(const NearPatch& patch, const Eigen::Vector2f& centre, Samples& values, Samples& by_x,
-                                 Samples& by_y) const {
+bool SampleSquare::sampleUpright(const PaddedPatch& patch, const Eigen::Vector2f& centre, Samples& values,
+                                 Samples& by_x, Samples& by_y) const {
   const float half = 0.5f * static_cast<float>(patch.side() - 1);
   if (!(centre.cwiseAbs().maxCoeff() + static_cast<float>(kAlignedRadius + 1) <= half)) return false;
   runKernel<SampleUpright>(patch.samples(), patch.side(), half + centre.x(), half + centre.y(), values.data(),

@@ -20,7 +20,7 @@ constexpr int kSamples = kSampledSide * kSampledSide + 2 * 8;
 using Samples = std::array<float, kSamples>;
 
 /// A copy of a patch with room behind it, so that kernels may read whole registers.
-class NearPatch {
+class PaddedPatch {
  public:
   void take(const Patch& patch);
 
@@ -45,12 +45,12 @@ class SampleSquare {
 
   /// Samples a patch bilinearly on this square around `centre`; `grid` maps the square's offsets to the patch's. All
   /// are in samples of the patch, from its middle. False if a corner of the square lies outside.
-  bool sample(const NearPatch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
+  bool sample(const PaddedPatch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
               Samples& values) const;
 
   /// The same with the patch's own grid, and the derivatives by x and y: half of the difference between both
   /// neighbours, which must not lie outside either.
-  bool sampleUpright(const NearPatch& patch, const Eigen::Vector2f& centre, Samples& values, Samples& by_x,
+  bool sampleUpright(const PaddedPatch& patch, const Eigen::Vector2f& centre, Samples& values, Samples& by_x,
                      Samples& by_y) const;
 
  private:

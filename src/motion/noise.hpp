@@ -14,8 +14,8 @@ constexpr int kFewestMeasured = 20;
 /// Weight of the previous mean in a running mean over confirmed pairs: a memory of about ten pairs (chosen).
 constexpr double kUsualMemory = 0.9;
 
-/// Side, px (chosen), of a part of the image within which the errors of patches and rectification are correlated.
-constexpr double kPart = 24.0;
+/// Side, px (chosen), of a square of the image within which the errors of patches and rectification are correlated.
+constexpr double kCorrelatedSide = 24.0;
 
 /// Cell of a position (px) in a grid over an image, row by row; the nearest cell for a position outside.
 inline int gridCell(double u, double v, int width, int height, int columns, int rows) {
@@ -47,8 +47,8 @@ class Noise {
   /// px: two aligned positions that are further apart are not of one point.
   double alignedGate() const { return std::sqrt(2.0 * noiseGate(2)) * NoiseOptions::kReference; }
 
-  /// Takes in the square, in standard deviations, by which the motion of a confirmed motion's lasting inliers differs
-  /// from that of all. It is chi-square of six if points err independently.
+  /// Takes in the square, in standard deviations, by which the motion of a confirmed motion's lasting inliers (points
+  /// with four confirmed sightings) differs from that of all. It is chi-square of six if points err independently.
   void learnShared(double square) { shared_ += (1.0 - kUsualMemory) * (square / 6.0 - shared_); }
 
   /// Takes in the median square, in standard deviations (chi-square of two), of a confirmed pair's residuals in the

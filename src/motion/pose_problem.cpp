@@ -45,21 +45,21 @@ void PoseProblem::visitSquares(const Eigen::Isometry3d& T, const Visit& visit) c
   }
 }
 
-double PoseProblem::truncatedCost(const Eigen::Isometry3d& T, double score_to_beat) const {
+double PoseProblem::truncatedCost(const Eigen::Isometry3d& T, double cost_to_beat) const {
   const double limit = threshold_ * threshold_;
   double sum = 0.0;
   visitSquares(T, [&](int, double square) {
     sum += std::min(square, limit);
-    return sum < score_to_beat;
+    return sum < cost_to_beat;
   });
   return sum;
 }
 
-double PoseProblem::outlierCost(const Eigen::Isometry3d& T, double score_to_beat) const {
+double PoseProblem::outlierCost(const Eigen::Isometry3d& T, double cost_to_beat) const {
   double outliers = 0.0;
   visitSquares(T, [&](int, double square) {
     outliers += std::sqrt(square) > threshold_;
-    return outliers < score_to_beat;
+    return outliers < cost_to_beat;
   });
   return outliers;
 }

@@ -41,16 +41,16 @@ class PoseProblem {
   PoseCandidates solve(const MinimalSample& sample) const;
 
   /// Sum over all correspondences of the squared residual, cut off at the threshold (MSAC, Torr and Zisserman 2000),
-  /// px^2; the smaller the better. Stops early, at some value above it, once `score_to_beat` is out of reach.
+  /// px^2; the smaller the better. Stops early, at some value above it, once `cost_to_beat` is out of reach.
   double truncatedCost(const Eigen::Isometry3d& T_current_reference,
-                       double score_to_beat = std::numeric_limits<double>::max()) const;
+                       double cost_to_beat = std::numeric_limits<double>::max()) const;
 
   /// The truncated cost of a pose that no correspondence agrees with.
   double worstCost() const { return threshold_ * threshold_ * count(); }
 
   /// Number of correspondences that are no inliers (RANSAC); stops early likewise.
   double outlierCost(const Eigen::Isometry3d& T_current_reference,
-                     double score_to_beat = std::numeric_limits<double>::max()) const;
+                     double cost_to_beat = std::numeric_limits<double>::max()) const;
 
   /// Ascending indices of the correspondences within so many thresholds.
   std::vector<int> inliers(const Eigen::Isometry3d& T_current_reference, double thresholds = 1.0) const;

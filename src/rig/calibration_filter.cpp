@@ -15,9 +15,9 @@ using Vector = RigEstimate::Vector;
 
 constexpr int kRememberedCommons = 200;  // windows (chosen): memory of updateCommon()
 // px/sqrt(s) (chosen): offset and bend change by 0.5 px in 100 s, by warmth or by knocks too small for a detection.
-constexpr double kWarming = 0.05;
-constexpr double kRolling = 5e-5;  // rad/sqrt(s) (chosen): kWarming at f = 1000 px
-constexpr double kClocks = 1e-4;   // s/sqrt(s) (chosen): 1 ms in 100 s, as of clocks whose rates differ by 1e-5
+constexpr double kDisparityWalk = 0.05;
+constexpr double kRollWalk = 5e-5;   // rad/sqrt(s) (chosen): kDisparityWalk at f = 1000 px
+constexpr double kDelayWalk = 1e-4;  // s/sqrt(s) (chosen): 1 ms in 100 s, as of clocks whose rates differ by 1e-5
 
 Vector priorOf(const CalibrationOptions& options) {
   return {options.prior_offset, options.prior_bend, 0.0, options.right_delay};
@@ -107,7 +107,7 @@ void CalibrationFilter::update(int oldest_id, int newest_id, const RigEstimate::
   calibration_ = calibration;
   // 1. The window's own information, without its prior: own * own_mean = (own + prior) * value - prior * prior_mean.
   // The value lacks the effect of the delay, for which disparities are compensated: by_delay adds it again.
-  // Only one triangle of `information` is accurate, and an asymmetry would grow from window to window.
+  // Rounding makes `information` asymmetric, which would grow from window to window.
   const RigCalibration::Vector by_delay = shape.col(RigEstimate::kDelay) * compensated_[RigEstimate::kDelay];
   const RigCalibration::Matrix own = 0.5 * kRealInformation * (information + information.transpose());
   const RigCalibration::Vector own_mean =
@@ -129,7 +129,8 @@ void CalibrationFilter::updateByRows(int parameter, double value, double sigma) 
 }
 
 Matrix CalibrationFilter::predict(double dt) {
-  return widen(diagonal(kWarming * kWarming * dt, kRolling * kRolling * dt, kClocks * kClocks * dt));
+  return widen(
+      diagonal(kDisparityWalk * kDisparityWalk * dt, kRollWalk * kRollWalk * dt, kDelayWalk * kDelayWalk * dt));
 }
 
 Matrix CalibrationFilter::widen(const StereoCamera& camera, const Eigen::Matrix3d& rotation) {

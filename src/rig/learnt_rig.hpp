@@ -40,7 +40,8 @@ struct RotationHypothesis {
 struct LearntRig {
   CalibrationFilter calibration;
   RowPattern row_pattern;  ///< mean over confirmed pairs
-  /// Rotation of the right camera since the map began, rad. Features are rotated back by it before all other steps.
+  /// Rotation of the right camera since these estimates began, rad. Features are rotated back by it before all other
+  /// steps.
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Zero();
   RightCameraDelay right_delay;
@@ -64,8 +65,9 @@ struct LearntRig {
   RigEstimate::Matrix rotate(const RotationHypothesis& new_rotation, const StereoCamera& camera);
 
   /// Learns from a pair. A rotation is taken back if the next pair's matches agree on no motion: its images were wrong,
-  /// not the rig. Refused pairs raise the odds of right images of other moments, unconfirmed ones interrupt the pairs
-  /// of delay and readout. `measured` is null without a motion.
+  /// not the rig. `features` are those with which the motion was found; `measured` has them with the delay. Refused
+  /// pairs raise the odds of right images of other moments, unconfirmed ones interrupt the pairs of delay and readout.
+  /// `measured` is null without a motion.
   void learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
              const RotationHypothesis& new_rotation, bool is_confirmed);
 

@@ -41,6 +41,8 @@ struct AddRotationEquations {
       load(values + 4 * stride + k, y), load(values + 5 * stride + k, x);
       x = (x - p.cx) * inverse_fx, y = (y - p.cy) * inverse_fy;
       const double *n = equations->inverse_noise, *w = equations->rotation;
+      // Derivatives in standard deviations: of u by x and z, of v by y and z, of the disparity by z and by the
+      // rotation.
       const DoubleLanes a = n[0] * p.fx * at.inverse_depth, b = n[1] * p.fy * at.inverse_depth;
       const DoubleLanes left = -a * at.x * at.inverse_depth, down = -b * at.y * at.inverse_depth;
       // The disparity replaces u_right, whose error is mostly that of u_left.
@@ -182,7 +184,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
   }
   const UnknownsMatrix inverse = equations.hessian.inverse();
   found.covariance = equations.sandwich(inverse);
-  // For an error of 1 px of each row and disparity: n / 3 of them constrain each of the three directions.
+  // n / 3 times (J^T J)^-1: rotations of this covariance shift the n disparities by 1 px rms.
   found.by_pixel = static_cast<double>(inliers.size()) / (3.0 * disparity_sigma * disparity_sigma) *
                    inverse.bottomRightCorner<3, 3>();
   return found;

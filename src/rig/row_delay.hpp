@@ -35,7 +35,7 @@ class RowDelay {
   struct Sample {
     int part;         ///< of the image, row by row
     double dv;        ///< v_right - v_left, px
-    double velocity;  ///< of its row in the right image, px/s
+    double velocity;  ///< of its row, px/s
     /// px/s: instrument, the row's velocity by slow rotations; where these are unknown, its whole velocity.
     double turning;
     double disparity;  ///< px

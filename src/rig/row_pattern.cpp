@@ -91,6 +91,7 @@ std::optional<RightRotation> RowPattern::fit(const Parts& parts) {
   if (known < kFewest) return std::nullopt;
   constexpr double kSteady = 1e-3;  // 1/rad^2: keeps the equations solvable if all parts lie in a line
   const Eigen::Matrix3d inverse = (information + kSteady * Eigen::Matrix3d::Identity()).inverse();
+  // By a pixel as in rotationByDisparities(): a third of the measurements for each direction.
   RightRotation rotation{inverse * product, Eigen::Matrix3d::Zero(), weight / 3.0 * inverse};
   for (const Part& part : parts) {
     // A residual is smaller than its error by the part's leverage (MacKinnon and White 1985, HC3).

@@ -37,6 +37,7 @@ class RowReadout {
   /// The next pair does not continue the last one.
   void interrupt() { pairs_.clear(), last_positions_.clear(); }
 
+  /// None from fewer than two pairs, or while its standard deviation is RowDelay::kFail or larger.
   std::optional<Estimate> estimate() const;
 
   /// Covariance of a pair's motion by the unknown readout alone: its second moment around `compensated`, s, carried to

@@ -20,16 +20,16 @@ Finding judged(StereoCamera told, bool turns = true, double focus = 0.0) {
   std::normal_distribution<double> noise(0.0, 0.2);
   for (int pair = 0; pair < 40; ++pair) {
     told.fx += pair % 2 == 0 ? focus : -focus;
-    Eigen::Isometry3d T_before_now = Eigen::Isometry3d::Identity();
-    T_before_now.translation() = Eigen::Vector3d(0.01 * any(random), 0.01 * any(random), 0.1);
+    Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
+    T_previous_current.translation() = Eigen::Vector3d(0.01 * any(random), 0.01 * any(random), 0.1);
     if (turns)
-      T_before_now.linear() = (Eigen::AngleAxisd(0.04 * std::sin(0.3 * pair), Eigen::Vector3d::UnitY()) *
-                               Eigen::AngleAxisd(0.02 * std::cos(0.4 * pair), Eigen::Vector3d::UnitX()))
-                                  .toRotationMatrix();
+      T_previous_current.linear() = (Eigen::AngleAxisd(0.04 * std::sin(0.3 * pair), Eigen::Vector3d::UnitY()) *
+                                     Eigen::AngleAxisd(0.02 * std::cos(0.4 * pair), Eigen::Vector3d::UnitX()))
+                                        .toRotationMatrix();
     std::vector<LensCheck::Track> tracks;
     for (int i = 0; i < 100; ++i) {
       const LensCheck::Track now{u(random), v(random), disparity(random), 0.0, 0.0};
-      Eigen::Vector3d before = kTrue.project(T_before_now * kTrue.backProject(now.u, now.v, now.disparity));
+      Eigen::Vector3d before = kTrue.project(T_previous_current * kTrue.backProject(now.u, now.v, now.disparity));
       if (i % 10 == 0) before += 10.0 * Eigen::Vector3d(any(random), any(random), 0.0);
       tracks.push_back({now.u + noise(random), now.v + noise(random), now.disparity + noise(random),
                         before.x() + noise(random), before.y() + noise(random)});

@@ -480,7 +480,7 @@ TEST(LocalMap, HoldsAsManyKeyframesAsItIsTold) {
   const synthetic::World world = someWorld(20);
   LocalMapOptions options = everyPairAKeyframe();
   options.keyframes = 3;
-  options.lasting_points = 21;  // more than there are
+  options.min_shared_points = 21;  // more than there are
   LocalMap map(options);
   for (int id = 1; id <= 6; ++id) {
     const Eigen::Isometry3d pose = translated(0.1 * id, 0.0, 0.0);
@@ -494,15 +494,15 @@ TEST(LocalMap, HoldsAsManyKeyframesAsItIsTold) {
 TEST(LocalMap, HoldsAnOldKeyframeWhileItSharesEnough) {
   constexpr int kPoints = 80;
   struct Case {
-    int lasting_points, shared;
+    int min_shared_points, shared;
     bool stays;
   };
-  for (const auto& [lasting_points, shared, stays] :
+  for (const auto& [min_shared_points, shared, stays] :
        {Case{20, 20, true}, Case{20, 19, false}, Case{5, 5, true}, Case{5, 4, false}}) {
     const synthetic::World world = someWorld(2 * kPoints);
     LocalMapOptions options = everyPairAKeyframe();
     options.keyframes = 2;
-    options.lasting_points = lasting_points;
+    options.min_shared_points = min_shared_points;
     LocalMap map(options);
     add(map, see(world, kPoints, 2 * kPoints, translated(0.1, 0.0, 0.0)), 1, translated(0.1, 0.0, 0.0), {});
     for (int id = 2; id <= 4; ++id) {
@@ -517,7 +517,7 @@ TEST(LocalMap, HoldsAnOldKeyframeWhileItSharesEnough) {
       }
       add(map, features, id, pose, sightings);
     }
-    EXPECT_EQ(map.oldestId(), stays ? 1 : 2) << shared << " of 80 points, " << lasting_points << " asked for";
+    EXPECT_EQ(map.oldestId(), stays ? 1 : 2) << shared << " of 80 points, " << min_shared_points << " asked for";
   }
 }
 

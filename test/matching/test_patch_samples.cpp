@@ -10,7 +10,7 @@ namespace sdvo::test_patch_samples {
 /// A patch of noise.
 struct Noise {
   std::vector<std::uint8_t> samples;
-  NearPatch patch;
+  PaddedPatch patch;
 
   Noise(int side, std::mt19937& random) : samples(static_cast<std::size_t>(side * side)) {
     for (std::uint8_t& sample : samples) sample = static_cast<std::uint8_t>(random());
@@ -19,7 +19,7 @@ struct Noise {
 };
 
 /// The value at one place.
-float valueAt(const NearPatch& patch, const Eigen::Vector2f& place) {
+float valueAt(const PaddedPatch& patch, const Eigen::Vector2f& place) {
   Samples values;
   EXPECT_TRUE(SampleSquare().sample(patch, place, Eigen::Matrix2f::Zero(), values));
   return values[0];

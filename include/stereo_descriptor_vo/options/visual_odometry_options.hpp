@@ -34,14 +34,16 @@ struct NoiseOptions {
   /// Root mean square length of (u_left, v_left, u_right) between a corner and the map's point: both err.
   double length() const { return std::sqrt(6.0 * corner * corner + common_disparity * common_disparity); }
 
-  /// The largest such length. u_left and u_right share the corners' errors.
+  /// The largest such length. u_left and u_right share the corners' errors (a factor of sqrt(2)), and both corners err
+  /// (another one).
   double inlierGate() const { return 2.0 * corner * std::sqrt(noiseGate(1)); }
 
   /// The largest distance of a corner from its point, in each direction.
   double cornerGate() const { return corner * std::sqrt(noiseGate(1)); }
 
   /// Standard deviation, in each direction, of a corner that no patch confirms, px. It may lie anywhere in the disc
-  /// where u_left and u_right are within the gate.
+  /// where u_left and u_right are within the gate:
+  /// its radius is the gate / sqrt(2), and the deviation in each direction half of that.
   double unconfirmedCorner() const { return inlierGate() / std::sqrt(8.0); }
 };
 
@@ -91,7 +93,7 @@ struct MotionEstimatorOptions : SampleConsensusOptions, MotionRefinementOptions 
 
 struct LocalMapOptions {
   int keyframes = 8;
-  int lasting_points = 150;  ///< that older key frames share with the newest pair at least (chosen)
+  int min_shared_points = 150;  ///< with the newest pair, of an older key frame in the map (chosen)
   int remembered_keyframes = 40;
   double keyframe_parallax = 4.0;  ///< px, median since the last key frame, from which a pair is one (chosen)
   double keyframe_overlap = 0.6;   ///< … or a smaller ratio of its points is seen in the last one (chosen)

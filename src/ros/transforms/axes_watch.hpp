@@ -23,12 +23,12 @@ class AxesWatch {
 
   explicit AxesWatch(Report warn) : warn_(std::move(warn)) {}
 
-  /// `T_before_now`: of the camera since the pair before. `is_base`: the base is the camera itself.
-  void add(const Eigen::Isometry3d& T_base_camera, bool is_base, const Eigen::Isometry3d& T_before_now,
+  /// `T_previous_current`: of the camera since the pair before. `is_base`: the base is the camera itself.
+  void add(const Eigen::Isometry3d& T_base_camera, bool is_base, const Eigen::Isometry3d& T_previous_current,
            const PlanarOptions& floor) {
-    if (!is_base) optical_axis_.add(T_base_camera, T_before_now);
+    if (!is_base) optical_axis_.add(T_base_camera, T_previous_current);
     warnOnce("axes", optical_found_, optical_axis_.judge(), "");
-    mount_.add(T_base_camera, T_before_now);
+    mount_.add(T_base_camera, T_previous_current);
     if (floor.planar && !mount_found_.isFault())
       warnOnce("mount", mount_found_, mount_.judge(floor.planar_tilt_sigma), "");
   }
