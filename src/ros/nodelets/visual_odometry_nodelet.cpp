@@ -236,9 +236,10 @@ class VisualOdometryNodelet : public RobotNodelet {
       const std::lock_guard<std::mutex> lock(work_mutex_);
       if (!imu_ || axes_->trustsGyro()) guess.since = processed_;
     }
-    // Of another camera the last mount is not, and without one there is no guess of its motion.
-    const bool is_mounted = mount_->knows(options_.base_frame_id, camera_frame);
-    if (guess.since && is_mounted && guesses_->hasSource()) guess.motion = awaitGuess(*guess.since, header, isVoid);
+    // By TF it is the base's motion in the axes of the last mount, which is not that of another camera's first pair.
+    const bool has_axes = options_.guess_frame_id.empty() || mount_->knows(options_.base_frame_id, camera_frame);
+    if (guess.since && mount_->last() && has_axes && guesses_->hasSource())
+      guess.motion = awaitGuess(*guess.since, header, isVoid);
     if (options_.awaitsMotion()) guess.T_guess_base = guesses_->base(header.stamp);
     return guess;
   }
