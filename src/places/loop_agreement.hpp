@@ -23,9 +23,9 @@ class LoopAgreement {
     const auto agrees = [&](const GraphEdge& earlier) {
       if (near_from.count(earlier.from) == 0 || near_to.count(earlier.to) == 0 || earlier.to == proposal.to)
         return false;
-      const Eigen::Isometry3d T_from_from = nodes.at(proposal.from).inverse() * nodes.at(earlier.from);
-      const Eigen::Isometry3d T_to_to = nodes.at(earlier.to).inverse() * nodes.at(proposal.to);
-      const Eigen::Isometry3d offset = proposal.T_from_to.inverse() * T_from_from * earlier.T_from_to * T_to_to;
+      const Eigen::Isometry3d T_from_earlier = nodes.at(proposal.from).inverse() * nodes.at(earlier.from);
+      const Eigen::Isometry3d T_earlier_to = nodes.at(earlier.to).inverse() * nodes.at(proposal.to);
+      const Eigen::Isometry3d offset = proposal.T_from_to.inverse() * T_from_earlier * earlier.T_from_to * T_earlier_to;
       return offset.translation().norm() <= kLargestTranslation &&
              Eigen::AngleAxisd(offset.linear()).angle() <= kLargestRotation * CV_PI / 180.0;
     };

@@ -18,7 +18,7 @@ namespace sdvo {
 /// bits, Indyk and Motwani 1998; weights as in text retrieval, Sivic and Zisserman 2003).
 class PlaceIndex {
  public:
-  // 18 bits make 262,144 words: few of a hundred thousand different descriptors share one by chance.
+  // 18 bits make 262,144 words: a hundred thousand different descriptors put 0.4 into each by chance.
   static constexpr int kWordsPerRow = 4;
   static constexpr int kBitsPerWord = 18;
 

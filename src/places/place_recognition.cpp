@@ -96,12 +96,15 @@ bool PlaceRecognition::isCandidate(const Place& place, const Place& here) const 
 }
 
 /// Removes the oldest places beyond max_places. With localisation_only, only the newest key frames of this session are
-/// kept, for the path between two loops.
+/// kept, and the last loop.
 void PlaceRecognition::forgetOldest() {
   constexpr int kKept = 20;
   if (options_.localisation_only) {
-    while (static_cast<int>(std::distance(places_.lower_bound(restored_), places_.end())) > kKept)
-      forget(places_.lower_bound(restored_)->first);
+    while (static_cast<int>(std::distance(places_.lower_bound(restored_), places_.end())) > kKept) {
+      const int oldest = places_.lower_bound(restored_)->first;
+      graph_.passLoopsOn(oldest);
+      forget(oldest);
+    }
     return;
   }
   while (static_cast<int>(places_.size()) > options_.max_places) forget(places_.begin()->first);
@@ -111,6 +114,7 @@ void PlaceRecognition::forget(int id) {
   tools_->index.remove(id);
   graph_.remove(id);
   places_.erase(id);
+  if (recognised_ == id) recognised_.reset();  // the drift counts from the first place again
 }
 
 /// Whether the last pair becomes a key frame: it is far enough from the last one and has enough features.
@@ -167,20 +171,21 @@ void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
     }
     report.same = candidate.place;
     const std::vector<GraphEdge> loops = tools_->agreement.confirm(graph_, loop);
-    for (const GraphEdge& trusted : loops) graph_.close(trusted);
-    report.loop = !loops.empty();
+    for (const GraphEdge& trusted : loops) report.loop |= graph_.close(trusted);
     if (report.loop) {
       recognised_ = candidate.place;
       expectation_.reset();
     }
-    report.reason = report.loop ? "" : "no other key frame nearby has confirmed it yet";
+    report.reason = report.loop     ? ""
+                    : loops.empty() ? "no other key frame nearby has confirmed it yet"
+                                    : "it is in a part of the loaded map that no loop joins with the one localised in";
     return;
   }
 }
 
 /// Whether the correction by a loop is within the drift that the odometry can have on the path between its nodes.
 bool PlaceRecognition::isPossible(const GraphEdge& loop) const {
-  constexpr double kImpossible = 22.5;  // chi-square of six, 99.9 %
+  constexpr double kImpossible = 22.5;  // chi-square of six, 99.9 % (chosen): a false loop costs more than one left out
   const GraphPath path = graph_.path(loop.from, loop.to);
   if (!path.known) return true;
   // The error of a loop may exceed its covariance. Small corrections are always possible; else one inexact loop would

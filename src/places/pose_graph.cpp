@@ -86,21 +86,44 @@ void PoseGraph::extend(const GraphEdge& edge) {
   edges_.push_back(edge);
 }
 
-void PoseGraph::close(const GraphEdge& edge) {
+bool PoseGraph::close(const GraphEdge& edge) {
   const Eigen::Isometry3d T_map_from = nodes_.at(edge.from), T_map_to = nodes_.at(edge.to);
   constexpr double kAny = std::numeric_limits<double>::infinity();
+  const int last_fixed = held_.value_or(nodes_.begin()->first);
   std::set<int> moved = near(edge.to, kAny);
   if (moved.count(edge.from) == 0) {
-    // The loop joins two parts of the graph: that without the first node moves to the other one.
+    // The loop joins two parts of the graph: that without fixed nodes moves to the other one.
     Eigen::Isometry3d T_moved = T_map_from * edge.T_from_to * T_map_to.inverse();
-    if (moved.count(nodes_.begin()->first) > 0) {
+    if (*moved.begin() <= last_fixed) {
       moved = near(edge.from, kAny);
+      if (*moved.begin() <= last_fixed) return false;
       T_moved = T_moved.inverse();
     }
     for (const int id : moved) nodes_[id] = orthonormalised(T_moved * nodes_[id]);
     ++moved_parts_;
   }
   edges_.push_back(edge);
+  return true;
+}
+
+void PoseGraph::passLoopsOn(int id) {
+  const auto next = std::find_if(edges_.begin(), edges_.end(), [id](const GraphEdge& e) {
+    return e.from == id && e.kind == GraphEdge::Kind::kOdometry;
+  });
+  if (next == edges_.end()) return;
+  std::vector<GraphEdge> passed;
+  for (const GraphEdge& edge : edges_) {
+    if (edge.kind != GraphEdge::Kind::kLoop) continue;
+    if (edge.to == next->to) return;
+    if (edge.to != id) continue;
+    GraphEdge loop = edge;
+    loop.to = next->to;
+    loop.T_from_to = edge.T_from_to * next->T_from_to;
+    loop.covariance = carried(next->T_from_to.inverse(), edge.covariance) + next->covariance;
+    loop.length += next->length, loop.turn += next->turn;
+    passed.push_back(loop);
+  }
+  edges_.insert(edges_.end(), passed.begin(), passed.end());
 }
 
 void PoseGraph::remove(int id) {

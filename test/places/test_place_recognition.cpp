@@ -237,6 +237,26 @@ TEST(PlaceRecognition, AMapThatIsOnlyLocalisedInStaysAsItIs) {
   EXPECT_LT(deviation, 0.5);
 }
 
+/// Without a break it is known how far the odometry may have drifted since the last loop, for as long as it goes on.
+TEST(PlaceRecognition, BeyondTheMapTheDriftIsKnownSinceTheLastLoop) {
+  Drive mapping;
+  mapping.go(0, 60);
+  for (const bool only_localised : {true, false}) {
+    PlaceRecognitionOptions options = Drive::fewAndFast();
+    options.localisation_only = only_localised;
+    options.max_places = 40;
+    Drive drive(0.001, options);
+    drive.recognition.restore(mapping.places(), mapping.recognition.graph());
+    ASSERT_GE(loops(drive.go(20, 60)), 5);
+    const auto at_loop = drive.recognition.covariance();
+    ASSERT_TRUE(at_loop);
+    drive.go(60, 180);  // 40 more key frames
+    const auto beyond = drive.recognition.covariance();
+    ASSERT_TRUE(beyond) << only_localised;
+    EXPECT_GT(beyond->trace(), 2.0 * at_loop->trace());
+  }
+}
+
 TEST(PlaceRecognition, AHintSaysWhereItIsAndWhereNotToLook) {
   Drive mapping;
   mapping.go(0, 150);

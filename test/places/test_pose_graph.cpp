@@ -138,6 +138,43 @@ TEST(PoseGraph, APartBehindABreakMovesAsAWholeOnceAPlaceIsRecognised) {
     EXPECT_LT((graph.nodes().at(k).translation() - truth(k).translation()).norm(), 0.2) << k;
 }
 
+/// A loaded map of two parts that no loop has joined, and a session that knows where it is in one of them.
+TEST(PoseGraph, ALoopThatWouldMoveAHeldPartIsNotAdded) {
+  const auto step = [](int from, int to, GraphEdge::Kind kind) {
+    return edge(from, to, kind, Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 1.0)), covariance(0.01, 0.001));
+  };
+  using Kind = GraphEdge::Kind;
+  PoseGraph graph;
+  graph.start(0, Eigen::Isometry3d::Identity());
+  for (int k = 1; k < 8; ++k) graph.extend(step(k - 1, k, k % 3 == 0 ? Kind::kBreak : Kind::kOdometry));
+  graph.hold(5);  // 0 to 2 and 3 to 5; 6 and 7 are of the session
+  const auto before = graph.nodes();
+  EXPECT_TRUE(graph.close(step(1, 7, Kind::kLoop)));
+  EXPECT_FALSE(graph.close(step(4, 7, Kind::kLoop)));
+  EXPECT_EQ(graph.loops(), 1);
+  for (int k = 0; k < 6; ++k) EXPECT_EQ(graph.nodes().at(k).matrix(), before.at(k).matrix()) << k;
+}
+
+TEST(PoseGraph, ALoopOutlivesItsNodeAsOneOfTheNextNode) {
+  Ring ring;
+  ring.graph.close(ring.loop(0, 100));
+  const GraphPath before = ring.graph.path(0, 105);
+  for (int k = 100; k < 103; ++k) {
+    ring.graph.passLoopsOn(k);
+    ring.graph.remove(k);
+  }
+  ring.graph.remove(50);  // no other way
+  const GraphPath after = ring.graph.path(0, 105);
+  ASSERT_TRUE(after.known);
+  EXPECT_EQ(ring.graph.loops(), 1);
+  EXPECT_NEAR(after.length, before.length, 1e-9);
+  EXPECT_TRUE(after.covariance.isApprox(before.covariance, 1e-9));
+  ring.graph.close(ring.loop(3, 104));
+  ring.graph.passLoopsOn(103);
+  ring.graph.remove(103);
+  EXPECT_EQ(ring.graph.loops(), 1) << "the next node has a loop of its own";
+}
+
 TEST(PoseGraph, AnOptimisedCopyIsAdoptedByWhatHasGrownMeanwhile) {
   Ring ring;
   for (int k = 100; k < 110; ++k) ring.graph.close(ring.loop(k - 100, k));
