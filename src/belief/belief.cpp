@@ -1,7 +1,8 @@
 #include "belief.hpp"
 
 #include <cmath>
-#include <sstream>
+
+#include "../common/text.hpp"
 
 namespace sdvo {
 namespace {
@@ -11,20 +12,16 @@ std::string placeWords(const StereoFeatures& features, const std::vector<int>& m
   double u = 0.0, v = 0.0;
   for (const int i : matched) u += features.u[i], v += features.v[i];
   const double count = std::max(static_cast<double>(matched.size()), 1.0);
-  std::ostringstream words;
-  words << matched.size() << " matches around (" << std::lround(u / count) << ", " << std::lround(v / count) << ") px";
-  return words.str();
+  return text(0, matched.size(), " matches around (", u / count, ", ", v / count, ") px");
 }
 
 /// Names the two motions in view, if a second one competes; else empty.
 std::string rivalWords(const MotionScene& scene, const MotionHypothesis& found) {
   if (!found.rival) return "";
-  std::ostringstream words;
-  words << "two motions in view, of " << placeWords(scene.features, found.inlierFeatures()) << " and of "
-        << placeWords(scene.features, found.rival->features)
-        << (found.rival->is_torn ? ", above and below a row: are the images torn or damaged?"
-                                 : ": does something move in front of the camera?");
-  return words.str();
+  return "two motions in view, of " + placeWords(scene.features, found.inlierFeatures()) + " and of " +
+         placeWords(scene.features, found.rival->features) +
+         (found.rival->is_torn ? ", above and below a row: are the images torn or damaged?"
+                               : ": does something move in front of the camera?");
 }
 
 /// Log of the odds beyond exp(kUnsuspected). logOddsWrong() counts the odds without evidence once; each evidence would
@@ -56,13 +53,18 @@ void Doubt::fade(double seconds) {
   // s (chosen by lab/run faults and healthy cars at 5 Hz): with 0.2 s a mover over most of the view is believed, from
   // 0.3 s on the cars are doubted.
   constexpr double kHalfLife = 0.25;
-  log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-seconds / kHalfLife);
+  lower(kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-seconds / kHalfLife));
+}
+
+/// What the doubt was of is forgotten with it.
+void Doubt::lower(double log_odds) {
+  log_odds_ = log_odds;
   if (!lasts()) distance_ = angle_ = largest_ = 0.0;
 }
 
 Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
   // Lasting points that agree refute the doubt of earlier pairs.
-  if (lasts()) log_odds_ = std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain);
+  if (lasts()) lower(std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain));
 
   // A wrong motion errs by its difference from the prior's motion; without a prior, by that from standstill. This is
   // the second moment of that error.
@@ -81,9 +83,8 @@ Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, co
   Belief belief;
   belief.probability = mixture.probability();
   belief.moment = mixture.moment();
-  std::ostringstream words;
-  words << mixture.likeliest().cause << ": the motion is wrong with a probability of " << 1.0 - belief.probability;
-  belief.reason = words.str();
+  belief.reason =
+      text(4, mixture.likeliest().cause, ": the motion is wrong with a probability of ", 1.0 - belief.probability);
 
   // The pair's evidence is carried to the next ones.
   raise(evidence);
@@ -102,11 +103,9 @@ Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, co
 }
 
 std::string innovationWords(const MotionHypothesis& found) {
-  std::ostringstream words;
-  words << "the motion differs from the prior by " << std::sqrt(found.innovation)
-        << " standard deviations (tracking/acceleration), " << found.agreement.lasting_inliers << " of "
-        << found.agreement.lasting_matches << " lasting points agree";
-  return words.str();
+  return text(2, "the motion differs from the prior by ", std::sqrt(found.innovation),
+              " standard deviations (tracking/acceleration), ", found.agreement.lasting_inliers, " of ",
+              found.agreement.lasting_matches, " lasting points agree");
 }
 
 }  // namespace sdvo

@@ -304,7 +304,7 @@ void MotionHypothesis::replaceMotion(const MotionScene& scene, const Eigen::Isom
   rivals_moment += found_is_right * momentOf(logSE3(apart));
   if (isTolerable(scene, T_current_reference, apart)) return;
   probability *= 1.0 - found_is_right;
-  rival = {T_found, found_is_right, dropped, false};
+  if (!rival || rival->probability < found_is_right) rival = {T_found, found_is_right, dropped, false};
 }
 
 std::vector<int> MotionHypothesis::inlierFeatures(const std::vector<int>& rejected) const {
@@ -350,7 +350,8 @@ double logFalseAlarms(int matches, int inliers, double chance) {
 }
 
 double chanceOfAgreement(double threshold, double gate) {
-  // A ball in (u_left, v_left, u_right) of radius `threshold`, and a cylinder of radius and half length `gate`.
+  // A ball in (u_left, v_left, u_right) of radius `threshold`, and a cylinder of radius and half length `gate`. The
+  // bound keeps it a probability where the gate is hardly wider than the threshold.
   return std::min(2.0 / 3.0 * std::pow(threshold / gate, 3), 0.5);
 }
 

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
-#include <sstream>
 #include <utility>
+
+#include "../common/text.hpp"
 
 namespace sdvo {
 
@@ -38,10 +39,13 @@ void MotionPrior::noteInterval(double dt) {
   longest_interval_ = std::max(dt, kUsualMemory * longest_interval_);
 }
 
-double MotionPrior::interval(double dt, const Eigen::Isometry3d& motion) const {
+double MotionPrior::interval(double dt) const {
   constexpr double kBurst = 0.2;  // ratio of the mean interval (chosen): a camera does not change its rate by as much
-  return std::max({dt < kBurst * mean_interval_ ? longest_interval_ : dt,
-                   motion.translation().norm() / options_.max_speed,
+  return dt < kBurst * mean_interval_ ? longest_interval_ : dt;
+}
+
+double MotionPrior::interval(double dt, const Eigen::Isometry3d& motion) const {
+  return std::max({interval(dt), motion.translation().norm() / options_.max_speed,
                    logSO3(motion.linear()).norm() / options_.max_rotation_rate});
 }
 
@@ -114,17 +118,17 @@ std::string MotionPrior::tooFast(const Eigen::Isometry3d& motion, const Matrix6d
   const double time = dt + sigmas * options_.stamp_sigma;
   const auto noise = [&](int first) { return sigmas * std::sqrt(covariance.block<3, 3>(first, first).trace()); };
   const double distance = motion.translation().norm(), angle = logSO3(motion.linear()).norm();
-  std::ostringstream words;
   if (!(distance <= options_.max_speed * time + noise(0)))
-    words << "a speed of " << distance / dt << " m/s exceeds tracking/max_speed";
-  else if (!(angle <= options_.max_rotation_rate * time + noise(3)))
-    words << "a rotation of " << angle / dt << " rad/s exceeds " << options_.max_rotation_rate << " rad/s";
-  return words.str();
+    return text(1, "a speed of ", distance / dt, " m/s exceeds tracking/max_speed");
+  if (!(angle <= options_.max_rotation_rate * time + noise(3)))
+    return text(1, "a rotation of ", angle / dt, " rad/s exceeds ", options_.max_rotation_rate, " rad/s");
+  return "";
 }
 
-void MotionPrior::takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt,
+void MotionPrior::takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& motion, double by_stamps,
                                const Matrix6d& covariance, bool is_confirmed, const Matrix6d& doubt) {
   doubt_ = doubt;
+  const double dt = interval(by_stamps);
   const Vector6d velocity = logSE3(motion) / dt;
   // The error of stamps may make a motion too fast, but such a velocity predicts no other motion.
   if (!(velocity.head<3>().norm() <= options_.max_speed) || !(velocity.tail<3>().norm() <= options_.max_rotation_rate))

@@ -72,10 +72,10 @@ class MotionPrior {
   /// Reason, if a motion over `dt` s exceeds a limit by more than its noise and stamps allow; else empty.
   std::string tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const;
 
-  /// Takes over the velocity of a motion over `dt` s up to `stamp`, ns. A doubtful motion leaves the confirmed velocity
-  /// as it is, unless there is none. `doubt`: its covariance, m and rad, beyond the measured one, which widens the next
-  /// prediction.
-  void takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,
+  /// Takes over the velocity of a motion up to `stamp`, ns, over so many seconds `by_stamps`. A doubtful motion leaves
+  /// the confirmed velocity as it is, unless there is none. `doubt`: its covariance, m and rad, beyond the measured
+  /// one, which widens the next prediction.
+  void takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& motion, double by_stamps, const Matrix6d& covariance,
                     bool is_confirmed, const Matrix6d& doubt);
 
   /// The next pair does not continue the last one: no motion is predicted. The confirmed velocity stays.
@@ -89,6 +89,8 @@ class MotionPrior {
     std::int64_t stamp;   ///< ns, at the interval's end
   };
 
+  /// Duration of a motion between stamps `dt` s apart: the usual one for a burst.
+  double interval(double dt) const;
   /// Covariance, m^2 and rad^2, of a motion over `dt` s under white acceleration. Its prediction is a mean velocity
   /// over `before` s, an interval that ended `age` s earlier.
   Matrix6d processNoise(double dt, double before, double age) const;

@@ -106,6 +106,7 @@ class MotionSearch::OnePair {
   MotionHypothesis search(const FeatureMatcher& matcher, const std::optional<Eigen::Isometry3d>& T_current_reference) {
     MotionHypothesis found;
     found.view = view_;
+    // Without a prediction: the radius of a circle as large as the image.
     found.gate =
         T_current_reference ? matcher.options().gate_radius : std::sqrt(camera_.width * camera_.height / CV_PI);
     Stopwatch stopwatch;

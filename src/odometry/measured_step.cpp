@@ -1,7 +1,7 @@
 #include <cmath>
-#include <sstream>
 #include <utility>
 
+#include "../common/text.hpp"
 #include "map_update.hpp"
 
 namespace sdvo {
@@ -52,10 +52,8 @@ OdometryStep measure(const MotionHypothesis& found, const MapUpdate& update, Odo
   const bool by_chance = mahalanobisSquare(step.correction, step.covariance) <= noiseGate(6);
   step.covariance += missingCovariance(step.covariance, step.correction) + by_rig;
   if (by_chance) return step;
-  std::ostringstream reason;
-  reason << "the map corrected the pose by " << step.correction.head<3>().norm() << " m and "
-         << step.correction.tail<3>().norm() << " rad";
-  step.reason = reason.str();
+  step.reason = text(4, "the map corrected the pose by ", step.correction.head<3>().norm(), " m and ",
+                     step.correction.tail<3>().norm(), " rad");
   return step;
 }
 
@@ -82,13 +80,11 @@ std::string deviationWords(const TrackingOptions& tracking, const SearchedPair& 
   if (place) covariance += place->mixture.moment();
   const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   if (deviation <= tracking.doubtful_deviation + kTolerableRatio * update.distance) return "";
-  std::ostringstream words;
-  if (pair.found.innovation > noiseGate(6))
-    words << innovationWords(pair.found);
-  else
-    words << "a distance of " << update.distance << " m with a standard deviation of " << deviation
-          << " m exceeds tracking/doubtful_deviation";
-  return words.str() + (place ? ": " + place->mixture.cause() : "");
+  const std::string words = pair.found.innovation > noiseGate(6)
+                                ? innovationWords(pair.found)
+                                : text(3, "a distance of ", update.distance, " m with a standard deviation of ",
+                                       deviation, " m exceeds tracking/doubtful_deviation");
+  return words + (place ? ": " + place->mixture.cause() : "");
 }
 
 }  // namespace
@@ -104,6 +100,8 @@ OdometryStep measuredStep(const VisualOdometryOptions& options, const std::optio
   if (pair.in_fallback_map) state.covariance.beginMap();  // startAgain() has done it already, the guess has not
   const Belief belief = state.doubt.update(*pair.scene, found, evidence);
   const bool is_doubtful = belief.probability < options.tracking.probability;
+  // Doubtful pairs confirm no points. Those too uncertain confirm no velocity either, and only TRACKING teaches the
+  // rig.
   takeMap(update, is_doubtful, state);
   OdometryStep step = measure(found, update, state);
   const Matrix6d measured = step.covariance;

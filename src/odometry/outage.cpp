@@ -36,7 +36,8 @@ void Outage::extend(double dt, const std::optional<MotionGuess>& guess, const Mo
 /// distance. Each guess counts for some distance, because no odometry at rest is exact.
 Matrix6d Outage::covarianceOf(const MotionGuess& guess, const Matrix6d& process_noise) {
   constexpr double kLeast = 0.02;  // of the process noise's standard deviation (chosen): 1 mm at 10 Hz
-  const Vector6d motion = logSE3(guess.T_previous_current);
+  Vector6d motion = logSE3(guess.T_previous_current);
+  if (guess.rotation_only) motion.head<3>().setZero();
   const auto grow = [&](double& path, double by, double variance) {
     const double before = path;
     path += std::max(by, kLeast * std::sqrt(variance));

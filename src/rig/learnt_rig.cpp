@@ -3,10 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <opencv2/core.hpp>
-#include <sstream>
 #include <utility>
+
+#include "../common/text.hpp"
 
 namespace sdvo {
 namespace {
@@ -34,10 +34,9 @@ double logOnePlus(double x) {
 }  // namespace
 
 std::string RotationHypothesis::words() const {
-  std::ostringstream words;
-  words << std::setprecision(2) << "the right camera seems to have turned by " << value.norm() * 180.0 / CV_PI
-        << " degrees (" << 1e3 * value.transpose() << " mrad about x, y, z): calibrate again";
-  return words.str();
+  const Eigen::Vector3d mrad = 1e3 * value;
+  return text(2, "the right camera seems to have turned by ", value.norm() * 180.0 / CV_PI, " degrees (") +
+         text(1, mrad.x(), " ", mrad.y(), " ", mrad.z(), " mrad about x, y, z): calibrate again");
 }
 
 LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assumed)

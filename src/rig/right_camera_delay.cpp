@@ -4,9 +4,9 @@
 #include <bitset>
 #include <cmath>
 #include <limits>
-#include <sstream>
 
 #include "../common/statistics.hpp"
+#include "../common/text.hpp"
 #include "../motion/noise.hpp"
 #include "rolling_shutter.hpp"
 
@@ -142,10 +142,8 @@ RightCameraDelay::OtherPair RightCameraDelay::otherPair(double dt) const {
 }
 
 std::string RightCameraDelay::OtherPair::words() const {
-  std::ostringstream words;
-  words << "the right image seemed to be that of another pair, taken " << std::round(1e3 * std::abs(delay)) << " ms "
-        << (delay < 0.0 ? "earlier" : "later");
-  return words.str();
+  return text(0, "the right image seemed to be that of another pair, taken ", 1e3 * std::abs(delay), " ms ",
+              delay < 0.0 ? "earlier" : "later");
 }
 
 StereoFeatures RightCameraDelay::synchronised(const StereoFeatures& features, double dt, const Vector6d& velocity,

@@ -102,6 +102,22 @@ TEST_F(Weighed, EvidenceForTheMotionTakesNothingFromItsCovariance) {
   EXPECT_EQ(belief.probability, plain.probability);
 }
 
+TEST_F(Weighed, ALikelierRivalStays) {
+  MotionHypothesis found;
+  for (int i = 0; i < 100; ++i) {
+    found.matches.push_back({i, i, 0.f});
+    found.motion.inliers.push_back(i);
+  }
+  const auto view = std::make_shared<LocalMap::View>();
+  view->seen.assign(100, 1);
+  found.view = view;
+  found.rival = MotionHypothesis::Rival{Eigen::Isometry3d::Identity(), 0.4, {}, true};
+  found.replaceMotion(scene_, Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 1.0)), {0, 1, 2, 3, 4});
+  ASSERT_TRUE(found.rival);
+  EXPECT_TRUE(found.rival->is_torn);
+  EXPECT_LT(found.probability, 1.0) << "the other one is still a rival";
+}
+
 TEST_F(Weighed, EvidenceMakesThePairDoubtfulWhateverAgrees) {
   Doubt doubt;
   const Belief belief = weigh(doubt, 90, {{kUnsuspected, "nothing"}, {2.0, "a knock"}});
@@ -117,6 +133,15 @@ TEST_F(Weighed, LastingPointsTakeADoubtBack) {
   const Belief belief = weigh(contradicted, 10);
   EXPECT_LT(belief.probability, 0.01);
   EXPECT_EQ(belief.reason.rfind("a moment ago a knock", 0), 0u) << belief.reason;
+}
+
+TEST_F(Weighed, ARefutedDoubtLeavesItsCauseBehind) {
+  Doubt doubt = after(kCertain, "a knock");
+  doubt.fade(0.5);
+  weigh(doubt, 100, {{1.0, "a frozen driver", true}});
+  doubt.fade(kPeriod);
+  const Belief belief = weigh(doubt, 10);
+  EXPECT_EQ(belief.reason.rfind("a moment ago a frozen driver", 0), 0u) << belief.reason;
 }
 
 TEST_F(Weighed, CausesExcludeEachOtherAndTheirOddsAddUp) {

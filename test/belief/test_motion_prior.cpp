@@ -4,6 +4,7 @@
 #include <random>
 
 #include "../../src/belief/motion_prior.hpp"
+#include "../comma_locale.hpp"
 #include "../said.hpp"
 
 namespace sdvo::test_motion_prior {
@@ -76,6 +77,20 @@ TEST(MotionPrior, APredictionWithinABurstIsAsUncertainAsTheIntervalBefore) {
   EXPECT_GT(std::sqrt(prior.predicted(0.001).covariance(2, 2)), 3.0 * 0.079);
   for (int i = 0; i < 100; ++i) prior.noteInterval(0.001);
   EXPECT_LT(std::sqrt(prior.predicted(0.001).covariance(2, 2)), 1e-3);
+}
+
+TEST(MotionPrior, AVelocityOverABurstIsThatOverTheUsualInterval) {
+  MotionPrior prior{TrackingOptions()};
+  for (int i = 0; i < 10; ++i) prior.noteInterval(0.03);
+  prior.takeVelocity(1'000'000, ahead(0.03), 0.001, Matrix6d::Zero(), true, Matrix6d::Zero());
+  EXPECT_NEAR(prior.velocity()->z(), 1.0, 1e-9);
+}
+
+/// Another nodelet may have set it.
+TEST(MotionPrior, WordsDoNotFollowTheLocale) {
+  const CommaLocale set;
+  EXPECT_EQ(MotionPrior(TrackingOptions()).tooFast(ahead(1234.5), Matrix6d::Zero(), 0.1),
+            "a speed of 12345.0 m/s exceeds tracking/max_speed");
 }
 
 TEST(MotionPrior, AnIntervalAfterAHiccupIsNoBurst) {

@@ -412,6 +412,20 @@ TEST(VisualOdometry, APredictionContainsTheMotionOfAPairWhoseStampIsThatOfABurst
   EXPECT_LT(motionError(predicted, moved), 25.0);
 }
 
+/// Its velocity is over the usual interval, not over the millisecond of its stamps.
+TEST(VisualOdometry, AMeasuredPairOfABurstPredictsNoLeap) {
+  const auto slow = [](int i) { return Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 0.1 * i)); };
+  VisualOdometry odometry({});
+  for (int i = 0; i <= 8; ++i) odometry.update(pairAt(slow(i), i, street()));
+  StereoFeatures burst = pairAt(slow(9), 9, street());
+  burst.stamp = stampOf(8) + 1000000;  // ns
+  ASSERT_TRUE(odometry.update(burst).has_motion);
+  const OdometryResult predicted = odometry.update(blindPair(10));
+  ASSERT_TRUE(predicted.has_motion) << predicted.reason;
+  EXPECT_LT(distanceBetween(predicted.T_previous_current, slow(1)), 0.2) << "of a way of 0.1 m";
+  EXPECT_LT(motionError(predicted, slow(1)), 25.0);
+}
+
 TEST(VisualOdometry, AMotionThatNoRobotMakesCostsOnePair) {
   VisualOdometryOptions options;
   options.tracking.max_speed = 12.0;                          // the drive goes at 8 m/s
