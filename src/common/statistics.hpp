@@ -23,7 +23,7 @@ inline double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
-/// Square of the quantile of Student's distribution, by degree of freedom, where that of the normal distribution is
+/// Square of the quantile of Student's distribution, divided by `freedom`, where that of the normal distribution is
 /// `square`: an upper bound, or an approximation with the `correction` (8 f + 3) / (8 f + 1) (Wallace 1959).
 inline double studentSquare(double square, double freedom, double correction = 1.0) {
   return std::expm1(square / freedom * correction * correction);

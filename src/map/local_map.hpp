@@ -63,8 +63,8 @@ class LocalMap {
   /// Points in the image of the newest pair, and those that the motion `T_next_newest` brings into the next one.
   View view(const std::optional<Eigen::Isometry3d>& T_next_newest = std::nullopt) const;
 
-  /// Points, in view or not, that are still looked for and that at least `sightings` pairs saw. In the newest pair's
-  /// left optical frame.
+  /// Points, in view or not, that are still looked for and that at least `sightings` confirmed pairs saw. In the newest
+  /// pair's left optical frame.
   DescribedPoints points(int sightings) const;
 
   /// A map point recognised in a pair: its observation there, and by which feature.
@@ -115,7 +115,7 @@ class LocalMap {
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
     std::vector<int> rejected;                      ///< features of the newest pair
-    double newest_square = 0.0;  ///< median of the newest pair's squared residuals, in standard deviations
+    double newest_square = 0.0;  ///< median square of the newest pair's residuals, in sigmas, as of two numbers
     int newest_measured = 0;     ///< number of these residuals
   };
   /// Bundle adjustment over all frames, which begins and ends with `calibration`. Outliers among the newest pair's

@@ -32,7 +32,7 @@ struct Window {
 
 struct WindowOptimizerOptions {
   NoiseOptions noise = {};
-  int iterations = 1;         ///< most accepted Levenberg-Marquardt steps for each pair
+  int iterations = 1;         ///< most accepted Levenberg-Marquardt steps: each new pair adjusts the window again
   double kernel_scale = 1.0;  ///< sigma: normalised residual that has half the weight
 };
 

@@ -38,7 +38,7 @@ struct RigEstimate {
   using Vector = Eigen::Matrix<double, kParameters, 1>;
   using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
   using MotionJacobian = Eigen::Matrix<double, 6, kParameters>;
-  using Shape = Eigen::Matrix<double, RigCalibration::kParameters, kParameters>;
+  using CalibrationByRig = Eigen::Matrix<double, RigCalibration::kParameters, kParameters>;
 
   Vector mean = Vector::Zero();
   Matrix covariance = Matrix::Zero();
@@ -57,8 +57,8 @@ struct RigEstimate {
 
   /// Derivative of the calibration that disparities show, px, by the rig. While the camera turns at `rate` (rad/s about
   /// its axes), a right camera that is late has rotated by that for each second of delay.
-  static Shape shape(const StereoCamera& camera, const Eigen::Vector3d& rate) {
-    Shape shape = Shape::Zero();
+  static CalibrationByRig calibrationByRig(const StereoCamera& camera, const Eigen::Vector3d& rate) {
+    CalibrationByRig shape = CalibrationByRig::Zero();
     shape(0, 0) = shape(1, 1) = 1.0;
     shape(2, kRoll) = -camera.fx;
     shape.col(kDelay) = shape * byRotation(camera) * rate;

@@ -23,7 +23,7 @@ MapUpdate adjust(const std::optional<Floor>& floor, OdometryTools& tools, const 
   if (map.newestIsKeyframe() && may_recall) tools.revisit.recall(features, update.calibration, map);
   // The adjustment has one calibration for all pairs: in it a delay acts at the window's mean rate of rotation.
   const auto [T_oldest_newest, seconds] = map.motionOfWindow();
-  update.calibration_by_rig = RigEstimate::shape(
+  update.calibration_by_rig = RigEstimate::calibrationByRig(
       features.camera, logSO3(T_oldest_newest.linear()) / state.prior.interval(seconds, T_oldest_newest));
   update.adjustment =
       map.adjust(tools.optimizer, state.rig.calibration.prior(update.calibration_by_rig), update.calibration, floor);

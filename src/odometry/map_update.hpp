@@ -14,8 +14,8 @@ struct MapUpdate {
   bool success = false;  ///< the pair joins the map
   std::string refusal;   ///< reason if it does not and a motion was found or searched
   RigCalibration calibration;
-  RigEstimate::Shape calibration_by_rig;  ///< derivative of the window's one calibration by the rig
-  double delay = 0.0;                     ///< of the right camera, compensated, s
+  RigEstimate::CalibrationByRig calibration_by_rig;  ///< derivative of the window's one calibration by the rig
+  double delay = 0.0;                                ///< of the right camera, compensated, s
   LocalMap::Adjustment adjustment;
   Eigen::Isometry3d motion;             ///< T_reference_current after the adjustment
   Eigen::Isometry3d T_keyframe_origin;  ///< of the last key frame, before the adjustment

@@ -34,7 +34,7 @@ class PairSearch {
     if (!state_.map || !state_.map->continuedBy(part_))
       pair_.kind = SearchedPair::kNoMap;
     else if (state_.interrupted)
-      pair_.kind = SearchedPair::kAfterOutage;
+      pair_.kind = SearchedPair::kInterrupted;
     else if ((pair_.log_odds_of_frozen = logOddsOfFrozen()) >= kCertain)
       pair_.kind = SearchedPair::kFrozen;
     else
@@ -43,7 +43,7 @@ class PairSearch {
     const bool has_majority = pair_.found.isOfMajority();
     if (pair_.kind == SearchedPair::kContinues && pair_.scene->T_current_reference && !has_majority) tryYaw();
     if (!(pair_.rotation.log_odds > 0.0)) return;
-    searchRotatedBack(pair_.rotation.value);
+    searchRotatedBack(pair_.rotation.value);  // the motion alone is found anew
   }
 
   /// The features as the map's camera sees them, without those that repeat the previous pair's. A focusing lens changes
@@ -149,7 +149,7 @@ class PairSearch {
   }
 
   std::optional<Vector6d> predictedVelocity() const {
-    const bool has_map = pair_.kind == SearchedPair::kContinues || pair_.kind == SearchedPair::kAfterOutage;
+    const bool has_map = pair_.kind == SearchedPair::kContinues || pair_.kind == SearchedPair::kInterrupted;
     return has_map && pair_.dt <= options_.tracking.max_gap ? state_.prior.velocity() : std::nullopt;
   }
 
@@ -215,7 +215,7 @@ class PairSearch {
     pair_.in_earlier_map = pair_.in_fallback_map = false;
     if (pair_.kind == SearchedPair::kContinues)
       pair_.scene.emplace(sceneOf(pair_.unrolled_map ? *pair_.unrolled_map : *state_.map, guess_));
-    if (pair_.kind == SearchedPair::kAfterOutage) findPlace();
+    if (pair_.kind == SearchedPair::kInterrupted) findPlace();
     pair_.found = pair_.scene ? tools_.motions.find(*pair_.scene, largestDoubt(options_.tracking)) : MotionHypothesis();
     if (!pair_.found.motion.success) return Vector6d::Zero();
     const Eigen::Isometry3d motion = pair_.found.motion.T_current_reference.inverse();

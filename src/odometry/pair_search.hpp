@@ -32,7 +32,7 @@ double largestDoubt(const TrackingOptions& tracking);
 struct SearchedPair {
   enum Kind {
     kNoMap,        ///< no map of its camera: it begins one
-    kAfterOutage,  ///< its pose in the map is unknown: it is looked for in all maps
+    kInterrupted,  ///< its pose in the map is unknown: it is looked for in all maps
     kFrozen,       ///< its images repeat although the camera moved: nothing is searched
     kContinues,    ///< the pair before has a pose in the map: the motion is searched near the expected one
   };

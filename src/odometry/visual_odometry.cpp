@@ -97,7 +97,7 @@ class VisualOdometry::Impl {
     state.walkRig(before, step_covariance);
   }
 
-  /// The pair with its measured motion; none without a motion, or with one that spans an outage.
+  /// The pair with its measured motion; none without a motion, or with one after an interruption.
   std::optional<MeasuredPair> measuredPair(const SearchedPair& pair) const {
     if (!pair.found.motion.success || state.interrupted || !(pair.dt > 0.0)) return std::nullopt;
     const Eigen::Isometry3d& motion = pair.found.motion.T_current_reference;

@@ -35,15 +35,15 @@ CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : option
   calibration_.value = compensated_.head<RigCalibration::kParameters>();
 }
 
-CalibrationBelief CalibrationFilter::prior(const RigEstimate::Shape& shape) const {
+CalibrationBelief CalibrationFilter::prior(const RigEstimate::CalibrationByRig& calibration_by_rig) const {
   constexpr double kExact = 0.01;  // px: 0.1 % of the depth at 10 px of disparity; less is ill-conditioned
   CalibrationBelief belief;
   RigCalibration::Matrix covariance = kExact * kExact * RigCalibration::Matrix::Identity();
   belief.mean = priorOf(options_).head<RigCalibration::kParameters>();
   if (options_.enabled) {
     const RigEstimate known = estimate();
-    belief.mean = shape.leftCols<RigEstimate::kDelay>() * known.mean.head<RigEstimate::kDelay>();
-    covariance += shape * known.covariance * shape.transpose();
+    belief.mean = calibration_by_rig.leftCols<RigEstimate::kDelay>() * known.mean.head<RigEstimate::kDelay>();
+    covariance += calibration_by_rig * known.covariance * calibration_by_rig.transpose();
   }
   // In the units of the adjustment, whose own information is too large by 1 / kRealInformation.
   belief.information = covariance.inverse() / kRealInformation;
@@ -100,22 +100,24 @@ void CalibrationFilter::updateCommon(double square) {
   common_square_ += (square - common_square_) / commons_;
 }
 
-void CalibrationFilter::update(int oldest_id, int newest_id, const RigEstimate::Shape& shape,
+void CalibrationFilter::update(int oldest_id, int newest_id, const RigEstimate::CalibrationByRig& calibration_by_rig,
                                const RigCalibration& calibration, const RigCalibration::Matrix& information) {
-  const CalibrationBelief prior = this->prior(shape);
-  compensated_ << calibration.value.head<2>(), calibration.value[2] / shape(2, RigEstimate::kRoll), delay();
+  const CalibrationBelief prior = this->prior(calibration_by_rig);
+  compensated_ << calibration.value.head<2>(), calibration.value[2] / calibration_by_rig(2, RigEstimate::kRoll),
+      delay();
   calibration_ = calibration;
   // 1. The window's own information, without its prior: own * own_mean = (own + prior) * value - prior * prior_mean.
   // The value lacks the effect of the delay, for which disparities are compensated: by_delay adds it again.
   // Rounding makes `information` asymmetric, which would grow from window to window.
-  const RigCalibration::Vector by_delay = shape.col(RigEstimate::kDelay) * compensated_[RigEstimate::kDelay];
+  const RigCalibration::Vector by_delay =
+      calibration_by_rig.col(RigEstimate::kDelay) * compensated_[RigEstimate::kDelay];
   const RigCalibration::Matrix own = 0.5 * kRealInformation * (information + information.transpose());
   const RigCalibration::Vector own_mean =
       own * (calibration.value + by_delay) + kRealInformation * prior.information * (calibration.value - prior.mean);
   // 2. Add it to the windows before that share no pair with it.
   if (next_past_id_ >= 0 && next_past_id_ < oldest_id) past_ = next_past_;
-  present_ = Likelihood{past_.information + shape.transpose() * own * shape,
-                        past_.information_mean + shape.transpose() * own_mean};
+  present_ = Likelihood{past_.information + calibration_by_rig.transpose() * own * calibration_by_rig,
+                        past_.information_mean + calibration_by_rig.transpose() * own_mean};
   // 3. It is the past of windows that begin after its last pair.
   if (next_past_id_ >= oldest_id) return;
   next_past_id_ = newest_id;

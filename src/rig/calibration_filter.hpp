@@ -27,14 +27,14 @@ class CalibrationFilter {
 
   /// Calibration before a window's adjustment: estimate(), which knows what the same window showed up to its last pair.
   /// While one key frame stays, a prior without that would remain as wide as in the beginning, and the window would
-  /// follow noise. The mean excludes the effect of delay(), for which disparities are compensated already. `shape`:
-  /// derivative of the calibration by the rig.
-  CalibrationBelief prior(const RigEstimate::Shape& shape) const;
+  /// follow noise. The mean excludes the effect of delay(), for which disparities are compensated already.
+  /// `calibration_by_rig`: RigEstimate::calibrationByRig().
+  CalibrationBelief prior(const RigEstimate::CalibrationByRig& calibration_by_rig) const;
 
   /// Adds the window from pair `oldest_id` to `newest_id`. `calibration` includes the window's prior(), `information`
   /// (1/px^2) excludes it.
-  void update(int oldest_id, int newest_id, const RigEstimate::Shape& shape, const RigCalibration& calibration,
-              const RigCalibration::Matrix& information);
+  void update(int oldest_id, int newest_id, const RigEstimate::CalibrationByRig& calibration_by_rig,
+              const RigCalibration& calibration, const RigCalibration::Matrix& information);
 
   /// Sets the roll, rad, or the delay, s (RigEstimate::kRoll or kDelay), that all rows up to now imply, and its
   /// standard deviation. It replaces the value of the last call.

@@ -12,7 +12,7 @@ namespace sdvo {
 /// Row of an inlier of the pair's motion.
 struct RowMotion {
   double velocity;  ///< down in the left image, px/s
-  double dv;        ///< v_right - v_left beyond a sound RowPattern and the known delay, px
+  double dv;        ///< v_right - v_left, px, less the known delay's effect and the RowPattern, unless isOfOtherPairs()
   int part;         ///< of the image (RowDelay::partOf)
 };
 

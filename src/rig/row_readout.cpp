@@ -146,6 +146,7 @@ std::optional<RowReadout::Estimate> RowReadout::estimate() const {
   const double spread = product_square_ - 2.0 * value * mixed_ + value * value * information_square_;
   // The spread of few pairs is uncertain: with this factor, kSquare is exceeded as rarely as with a known variance.
   // Wallace's approximation of Student's distribution: studentSquare().
+  // Times the pairs, not the freedom: the spread around an estimated value is too small by their ratio.
   const double freedom = pairs - 1.0, correction = (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
   const double student = pairs * studentSquare(RowDelay::kSquare, freedom, correction) / RowDelay::kSquare;
   const double sigma = std::sqrt(std::max(spread, 0.0) * student) / information_;

@@ -36,7 +36,8 @@ TEST(LocalMap, APairThatSharesHardlyAnythingWithTheOthersIsNotAdjusted) {
   SyntheticScene scene(3, 3000, 120.0);
   LocalMap map{LocalMapOptions()};
   WindowOptimizer optimizer{WindowOptimizerOptions()};
-  const CalibrationBelief prior = CalibrationFilter(CalibrationOptions()).prior(RigEstimate::Shape::Identity());
+  const CalibrationBelief prior =
+      CalibrationFilter(CalibrationOptions()).prior(RigEstimate::CalibrationByRig::Identity());
   const auto isAdjusted = [&](int id, std::size_t recognised) {
     RigCalibration calibration;
     see(map, scene.view(kOrigin, id), id, kOrigin, recognised);

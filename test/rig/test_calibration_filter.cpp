@@ -29,7 +29,8 @@ CalibrationOptions someOptions() {
 const Vector kPrior(0.5, -1.0, 0.0);
 const Matrix kInformation = Vector(12.0, 5.0, 7.0).asDiagonal();  // as a window states it
 
-const RigEstimate::Shape kAhead = RigEstimate::Shape::Identity();  // of a camera that does not turn, with f = -1 px
+const RigEstimate::CalibrationByRig kAhead =
+    RigEstimate::CalibrationByRig::Identity();  // of a camera that does not turn, with f = -1 px
 
 CalibrationBelief priorOf(const CalibrationFilter& filter) {
   return filter.prior(kAhead);
@@ -45,7 +46,7 @@ Vector sigmaOf(const CalibrationFilter& filter) {
 
 /// Adds the window of these pairs that would find `own` without a prior.
 void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& own,
-               const Matrix& information = kInformation, const RigEstimate::Shape& shape = kAhead) {
+               const Matrix& information = kInformation, const RigEstimate::CalibrationByRig& shape = kAhead) {
   const CalibrationBelief prior = filter.prior(shape);
   RigCalibration result;
   result.value = (prior.information + information).inverse() * (prior.information * prior.mean + information * own);
@@ -178,8 +179,8 @@ TEST(CalibrationFilter, HoldsThePriorWhenNotEnabled) {
   EXPECT_EQ(meanOf(filter), kPrior);
 }
 
-RigEstimate::Shape turning(double yaw) {
-  return RigEstimate::shape(someCamera(), {0.0, yaw, 0.0});
+RigEstimate::CalibrationByRig turning(double yaw) {
+  return RigEstimate::calibrationByRig(someCamera(), {0.0, yaw, 0.0});
 }
 
 /// A window of a rig without misalignment whose right image is so late beyond what is compensated.
@@ -245,7 +246,7 @@ TEST(RigEstimate, ShapeIsThatOfARightImageThatIsLate) {
         turn.tail<3>() = kLate * rate;
         const Eigen::Vector3d late = camera.project(expSE3(turn).inverse() * camera.backProject(u, v, 1e-3));
         RigCalibration shown;
-        shown.value = RigEstimate::shape(camera, rate).col(kDelay) * kLate;
+        shown.value = RigEstimate::calibrationByRig(camera, rate).col(kDelay) * kLate;
         const double disparity_error = u - late.x();  // the left one is at u, the right one would be, too
         EXPECT_NEAR(shown.disparityError(camera, u, v), disparity_error, 0.01) << rate.transpose() << " at " << u;
       }
