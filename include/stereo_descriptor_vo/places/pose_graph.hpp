@@ -60,8 +60,8 @@ class PoseGraph {
   /// the other part moves. Returns false, and adds nothing, if neither may.
   bool close(const GraphEdge& edge);
 
-  /// Lets the loops to a node lead on to the next one by the odometry between them, unless that has loops of its own:
-  /// so the path from a recognised place outlives the node.
+  /// Lets the loops to a node lead on to the next one by the odometry between them. So the path from a recognised place
+  /// outlives the node. Nothing changes if the next one has loops of its own.
   void passLoopsOn(int id);
 
   /// Removes a node and its edges. After the first node its successor is the fixed one.
