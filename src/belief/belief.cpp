@@ -53,18 +53,18 @@ void Doubt::fade(double seconds) {
   // s (chosen by lab/run faults and healthy cars at 5 Hz): with 0.2 s a mover over most of the view is believed, from
   // 0.3 s on the cars are doubted.
   constexpr double kHalfLife = 0.25;
-  lower(kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-seconds / kHalfLife));
+  setLogOdds(kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-seconds / kHalfLife));
 }
 
-/// What the doubt was of is forgotten with it.
-void Doubt::lower(double log_odds) {
+/// Once the doubt no longer lasts, the next evidence names its cause, and errors add up anew.
+void Doubt::setLogOdds(double log_odds) {
   log_odds_ = log_odds;
   if (!lasts()) distance_ = angle_ = largest_ = 0.0;
 }
 
 Belief Doubt::update(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
   // Lasting points that agree refute the doubt of earlier pairs.
-  if (lasts()) lower(std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain));
+  if (lasts()) setLogOdds(std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain));
 
   // A wrong motion errs by its difference from the prior's motion; without a prior, by that from standstill. This is
   // the second moment of that error.

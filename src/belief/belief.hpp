@@ -50,7 +50,7 @@ class Doubt {
 
  private:
   void raise(double odds, const std::string& cause);
-  void lower(double log_odds);
+  void setLogOdds(double log_odds);
 
   double log_odds_ = kUnsuspected;
   std::string cause_;                    ///< that with the largest odds since the doubt began

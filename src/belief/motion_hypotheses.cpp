@@ -350,8 +350,8 @@ double logFalseAlarms(int matches, int inliers, double chance) {
 }
 
 double chanceOfAgreement(double threshold, double gate) {
-  // A ball in (u_left, v_left, u_right) of radius `threshold`, and a cylinder of radius and half length `gate`. The
-  // bound keeps it a probability where the gate is hardly wider than the threshold.
+  // A ball in (u_left, v_left, u_right) of radius `threshold`, and a cylinder of radius and half length `gate`. At
+  // most one half (chosen), where the gate is hardly wider than the threshold.
   return std::min(2.0 / 3.0 * std::pow(threshold / gate, 3), 0.5);
 }
 

@@ -101,7 +101,8 @@ struct MotionHypothesis {
   void countAgreement();
   /// Counts the inliers alone again, without the rejected features of the pair.
   void countInliers(const std::vector<int>& rejected = {});
-  /// Takes another motion. The motion before becomes the rival, supported by the inliers with the features `dropped`.
+  /// Takes another motion. Unless there is a likelier one, the motion before becomes the rival,
+  /// supported by the inliers with the features `dropped`.
   void replaceMotion(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
                      const std::vector<int>& dropped);
 

@@ -89,7 +89,7 @@ class MotionPrior {
     std::int64_t stamp;   ///< ns, at the interval's end
   };
 
-  /// Duration of a motion between stamps `dt` s apart: the usual one for a burst.
+  /// Duration of a motion between stamps `dt` s apart: for a burst the longest recent one.
   double interval(double dt) const;
   /// Covariance, m^2 and rad^2, of a motion over `dt` s under white acceleration. Its prediction is a mean velocity
   /// over `before` s, an interval that ended `age` s earlier.

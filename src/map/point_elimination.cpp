@@ -239,7 +239,7 @@ struct AddPoint {
 
     // 2. Factor H_pp, damped: R = L^-1. `reduced` is R g_p.
     const double baseline = projection->camera.baseline;
-    // The inverse depth has the unit of length of the baseline.
+    // The inverse depth is in 1/m: the square of the baseline scales its information.
     const double least[3] = {kLeastInformation, kLeastInformation, kLeastInformation * baseline * baseline};
     for (int k = 0; k < 3; ++k) H_pp[k][k] = H_pp[k][k] * (1.0 + linearisation->damping) + least[k];
     double R[3][3];

@@ -100,8 +100,8 @@ OdometryStep measuredStep(const VisualOdometryOptions& options, const std::optio
   if (pair.in_fallback_map) state.covariance.beginMap();  // startAgain() has done it already, the guess has not
   const Belief belief = state.doubt.update(*pair.scene, found, evidence);
   const bool is_doubtful = belief.probability < options.tracking.probability;
-  // Doubtful pairs confirm no points. Those too uncertain confirm no velocity either, and only TRACKING teaches the
-  // rig.
+  // The calibration is taken from every adjusted pair. Doubtful ones confirm no points and teach no noise; those too
+  // uncertain do, but confirm no velocity.
   takeMap(update, is_doubtful, state);
   OdometryStep step = measure(found, update, state);
   const Matrix6d measured = step.covariance;

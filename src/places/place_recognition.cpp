@@ -114,7 +114,7 @@ void PlaceRecognition::forget(int id) {
   tools_->index.remove(id);
   graph_.remove(id);
   places_.erase(id);
-  if (recognised_ == id) recognised_.reset();  // the drift counts from the first place again
+  if (recognised_ == id) recognised_.reset();  // the drift counts from the first place that is left
 }
 
 /// Whether the last pair becomes a key frame: it is far enough from the last one and has enough features.
@@ -171,14 +171,13 @@ void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
     }
     report.same = candidate.place;
     const std::vector<GraphEdge> loops = tools_->agreement.confirm(graph_, loop);
-    for (const GraphEdge& trusted : loops) report.loop |= graph_.close(trusted);
+    for (const GraphEdge& trusted : loops) graph_.close(trusted);
+    report.loop = !loops.empty();
     if (report.loop) {
       recognised_ = candidate.place;
       expectation_.reset();
     }
-    report.reason = report.loop     ? ""
-                    : loops.empty() ? "no other key frame nearby has confirmed it yet"
-                                    : "it is in a part of the loaded map that no loop joins with the one localised in";
+    report.reason = report.loop ? "" : "no other key frame nearby has confirmed it yet";
     return;
   }
 }

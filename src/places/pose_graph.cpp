@@ -86,7 +86,7 @@ void PoseGraph::extend(const GraphEdge& edge) {
   edges_.push_back(edge);
 }
 
-bool PoseGraph::close(const GraphEdge& edge) {
+void PoseGraph::close(const GraphEdge& edge) {
   const Eigen::Isometry3d T_map_from = nodes_.at(edge.from), T_map_to = nodes_.at(edge.to);
   constexpr double kAny = std::numeric_limits<double>::infinity();
   const int last_fixed = held_.value_or(nodes_.begin()->first);
@@ -95,15 +95,19 @@ bool PoseGraph::close(const GraphEdge& edge) {
     // The loop joins two parts of the graph: that without fixed nodes moves to the other one.
     Eigen::Isometry3d T_moved = T_map_from * edge.T_from_to * T_map_to.inverse();
     if (*moved.begin() <= last_fixed) {
-      moved = near(edge.from, kAny);
-      if (*moved.begin() <= last_fixed) return false;
-      T_moved = T_moved.inverse();
+      const std::set<int> others = near(edge.from, kAny);
+      if (*others.begin() <= last_fixed) {
+        removeEdges([&](const GraphEdge& e) { return e.kind == GraphEdge::Kind::kLoop && e.to > last_fixed; });
+        moved = near(edge.to, kAny);
+      } else {
+        moved = others;
+        T_moved = T_moved.inverse();
+      }
     }
     for (const int id : moved) nodes_[id] = orthonormalised(T_moved * nodes_[id]);
     ++moved_parts_;
   }
   edges_.push_back(edge);
-  return true;
 }
 
 void PoseGraph::passLoopsOn(int id) {
@@ -128,9 +132,12 @@ void PoseGraph::passLoopsOn(int id) {
 
 void PoseGraph::remove(int id) {
   nodes_.erase(id);
-  edges_.erase(
-      std::remove_if(edges_.begin(), edges_.end(), [id](const GraphEdge& e) { return e.from == id || e.to == id; }),
-      edges_.end());
+  removeEdges([id](const GraphEdge& e) { return e.from == id || e.to == id; });
+}
+
+template <class IsGone>
+void PoseGraph::removeEdges(const IsGone& is_gone) {
+  edges_.erase(std::remove_if(edges_.begin(), edges_.end(), is_gone), edges_.end());
 }
 
 PoseGraph::Summary PoseGraph::optimise() {

@@ -79,7 +79,7 @@ TEST(MotionPrior, APredictionWithinABurstIsAsUncertainAsTheIntervalBefore) {
   EXPECT_LT(std::sqrt(prior.predicted(0.001).covariance(2, 2)), 1e-3);
 }
 
-TEST(MotionPrior, AVelocityOverABurstIsThatOverTheUsualInterval) {
+TEST(MotionPrior, AVelocityOverABurstIsThatOverTheLongestIntervalBefore) {
   MotionPrior prior{TrackingOptions()};
   for (int i = 0; i < 10; ++i) prior.noteInterval(0.03);
   prior.takeVelocity(1'000'000, ahead(0.03), 0.001, Matrix6d::Zero(), true, Matrix6d::Zero());

@@ -341,7 +341,7 @@ TEST(WindowOptimizer, InformationOfTheCalibrationIsWithoutThePrior) {
 
 TEST(WindowOptimizer, ThePriorPullsTowardsItsMean) {
   Window window = disturbedWindow(RigCalibration{});
-  window.calibration_prior.mean << 0.4, 0.3;
+  window.calibration_prior.mean << 0.4, 0.3, 0.0;
   window.calibration_prior.information = 1e9 * RigCalibration::Matrix::Identity();
   solved(window, leastSquares());
   EXPECT_LT((window.calibration.value - window.calibration_prior.mean).norm(), 1e-3);

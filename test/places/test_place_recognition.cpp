@@ -237,7 +237,8 @@ TEST(PlaceRecognition, AMapThatIsOnlyLocalisedInStaysAsItIs) {
   EXPECT_LT(deviation, 0.5);
 }
 
-/// Without a break it is known how far the odometry may have drifted since the last loop, for as long as it goes on.
+/// Without a break it is known how far the odometry may have drifted since the last loop, or since the first place that
+/// is kept, for as long as it goes on.
 TEST(PlaceRecognition, BeyondTheMapTheDriftIsKnownSinceTheLastLoop) {
   Drive mapping;
   mapping.go(0, 60);

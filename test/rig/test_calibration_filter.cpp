@@ -46,11 +46,12 @@ Vector sigmaOf(const CalibrationFilter& filter) {
 
 /// Adds the window of these pairs that would find `own` without a prior.
 void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& own,
-               const Matrix& information = kInformation, const RigEstimate::CalibrationByRig& shape = kAhead) {
-  const CalibrationBelief prior = filter.prior(shape);
+               const Matrix& information = kInformation,
+               const RigEstimate::CalibrationByRig& calibration_by_rig = kAhead) {
+  const CalibrationBelief prior = filter.prior(calibration_by_rig);
   RigCalibration result;
   result.value = (prior.information + information).inverse() * (prior.information * prior.mean + information * own);
-  filter.update(oldest, newest, shape, result, information);
+  filter.update(oldest, newest, calibration_by_rig, result, information);
 }
 
 double normal(double distance, double variance) {
@@ -236,7 +237,7 @@ TEST(CalibrationFilter, RowsShowRollAndDelayToo) {
 }
 
 /// As a late right image has it: points far away, in the middle and towards the corners.
-TEST(RigEstimate, ShapeIsThatOfARightImageThatIsLate) {
+TEST(RigEstimate, CalibrationByRigIsThatOfARightImageThatIsLate) {
   const StereoCamera camera = someCamera();
   constexpr double kLate = 0.002;  // s
   for (const Eigen::Vector3d& rate : {Eigen::Vector3d(0.0, 0.4, 0.0), Eigen::Vector3d(0.0, 0.0, 0.4)})

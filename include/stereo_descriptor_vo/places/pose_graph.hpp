@@ -57,8 +57,8 @@ class PoseGraph {
 
   /// Adds a loop between nodes of the graph. If all paths between them have breaks, the part of the graph around
   /// `edge.to` is moved rigidly, so that the loop's residual is zero. If the first node or a held one is in that part,
-  /// the other part moves. Returns false, and adds nothing, if neither may.
-  bool close(const GraphEdge& edge);
+  /// the other part moves. If both have held ones, the newest recognition counts: loops to nodes that are not held go.
+  void close(const GraphEdge& edge);
 
   /// Lets the loops to a node lead on to the next one by the odometry between them. So the path from a recognised place
   /// outlives the node. Nothing changes if the next one has loops of its own.
@@ -86,8 +86,8 @@ class PoseGraph {
   std::set<int> near(int id, double longest) const;
 
   /// Covariance with the largest drift on a path of `length` m and `turn` rad as its standard deviation (chosen: 3 % of
-  /// the way, 0.01 deg/m, 1 % of turns). Errors of the rig's calibration
-  /// add up along a path instead of averaging out, and the odometry's covariance does not contain them.
+  /// the way, 0.01 deg/m, 1 % of turns). Errors of the rig's calibration add up along a path instead of averaging out,
+  /// and the odometry's covariance does not contain them.
   Matrix6d drift(double length, double turn) const;
 
   /// Residual of an edge at the present poses, in standard deviations (the root of its chi-square of six).
@@ -102,6 +102,8 @@ class PoseGraph {
   double turnError() const { return turn_error_; }
 
  private:
+  template <class IsGone>
+  void removeEdges(const IsGone& is_gone);
   Matrix6d covariance(const GraphEdge& edge) const;
   void solve(Summary& summary);
   bool loopsHold() const;
