@@ -10,7 +10,9 @@ __attribute__((used)) const auto release = &boost::detail::sp_counted_base::rele
 /// `nodelet manager`, compiled here: the sanitizers must be in the executable, and the system's has none.
 int main(int argc, char** argv) {
   ros::init(argc, argv, "manager");
-  nodelet::Loader loader;
+  // Its destructor has its last callbacks unload what is gone already.
+  static nodelet::Loader& loader = *new nodelet::Loader;
   ros::spin();
+  loader.clear();
   return 0;
 }

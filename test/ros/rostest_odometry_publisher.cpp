@@ -49,7 +49,7 @@ class OdometryPublisherTest : public ::testing::Test {
   /// A result `step` m ahead of the origin, stamped as many tenths of a second later.
   static OdometryResult resultAt(int step) {
     OdometryResult result = trackedResult();
-    result.stamp += step * 100000000;
+    result.stamp += step * 100000000ll;
     result.T_origin_camera.translation().z() = step;
     return result;
   }
