@@ -78,8 +78,8 @@ class PlaceRecognition {
   Eigen::Isometry3d T_map_odom() const;
 
   /// Covariance of T_map_odom(), as that of a right perturbation of the last key frame in the map: it grows along the
-  /// path since the place that was recognised last, or since the first place that is kept. None if there is a break on
-  /// every path.
+  /// path since the place that was recognised last. If that place is forgotten, since the first one that is kept. None
+  /// if there is a break on every path.
   std::optional<Matrix6d> covariance() const;
 
   /// A hint of the odometry's pose in the map. The next key frame is put there, after a break. Until a place is
