@@ -60,7 +60,7 @@ cv::Mat correlationOf(const cv::Mat& block, const cv::Mat& image) {
 }
 
 /// Position of the best correlation with the block around `centre`, within `area`, a rectangle of block centres.
-/// Nothing unless 1 - best <= uniqueness * (1 - best elsewhere): else the texture repeats, or the true match lies
+/// Nothing unless 1 - best < uniqueness * (1 - best elsewhere): else the texture repeats, or the true match lies
 /// outside of the area. Nothing either if the block's standard deviation is below `flat`.
 std::optional<cv::Point> findBlock(const cv::Mat& from, const cv::Mat& in, cv::Point centre, cv::Size half,
                                    cv::Rect area, double uniqueness, double flat) {
@@ -83,7 +83,7 @@ std::optional<cv::Point> findBlock(const cv::Mat& from, const cv::Mat& in, cv::P
   const cv::Rect same(at.x - kSame, at.y - kSame, 2 * kSame + 1, 2 * kSame + 1);
   correlation(same & cv::Rect(0, 0, correlation.cols, correlation.rows)).setTo(-1.0);
   cv::minMaxLoc(correlation, nullptr, &elsewhere);
-  if (1.0 - best > uniqueness * (1.0 - elsewhere)) return std::nullopt;
+  if (1.0 - best >= uniqueness * (1.0 - elsewhere)) return std::nullopt;
   return cv::Point(reach.x + at.x + half.width, reach.y + at.y + half.height);
 }
 

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
+#include "../../src/front_end/block_search.hpp"
 #include "../../src/front_end/rig_monitor.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
@@ -132,6 +135,18 @@ TEST(RigMonitor, NamesAWallThatIsTooNear) {
     EXPECT_TRUE(diagnosis.too_near) << share << diagnosis.words;
     EXPECT_FALSE(diagnosis.refused) << share << diagnosis.words;
     EXPECT_EQ(contains(diagnosis.words, "too near"), share > 0.5) << share << diagnosis.words;
+  }
+}
+
+/// At the left border the first of the places that look alike is found from both sides.
+TEST(BlockSearch, TextureThatRepeatsIsNoWitness) {
+  cv::Mat unique = synthetic::noise({320, 200}, 7), repeating;
+  cv::GaussianBlur(unique, unique, {}, 3.0);
+  cv::normalize(unique, unique, 0, 255, cv::NORM_MINMAX);
+  cv::repeat(unique.colRange(0, 80), 1, 4, repeating);
+  for (float u = 30.f; u < 60.f; u += 10.f) {
+    EXPECT_TRUE(BlockSearch(unique, unique, 100.0, 8.0).find({u, 100.f})) << u;
+    EXPECT_FALSE(BlockSearch(repeating, repeating, 100.0, 8.0).find({u, 100.f})) << u;
   }
 }
 
