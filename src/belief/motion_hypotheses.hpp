@@ -62,7 +62,8 @@ struct MotionScene {
 
 /// A motion that competes for being the camera's, its matches and its rivals.
 struct MotionHypothesis {
-  MotionEstimate motion;  ///< since the map's newest pair; at last by patches, with covariance and rms of corners
+  /// Since the map's newest pair. The pose is refined by patches in the end; covariance and rms stay those by corners.
+  MotionEstimate motion;
   std::shared_ptr<const LocalMap::View> view;  ///< of the map, shared by all hypotheses of a pair
   std::vector<FeatureMatch> matches;           ///< of the view (reference) and the pair's features (current)
   std::vector<Correspondence> correspondences;

@@ -26,7 +26,7 @@ struct ArrivalFindings {
 
 /// Arrivals on the four inputs of a stereo camera, and the pairs made of them: rates, lateness, order, gaps, and images
 /// that make no pair, with the cause. /diagnostics, the log, check_camera and pages print its findings. Stamps in ns,
-/// 0: none. Times in s of any steady clock, for checkStamps() of the one that makes the stamps. For any thread.
+/// 0: none. Times are in s of any steady clock; checkStamps() needs the clock of the stamps. For any thread.
 class ArrivalLog {
  public:
   enum Input { kLeftImage, kRightImage, kLeftInfo, kRightInfo };

@@ -61,7 +61,7 @@ void GyroAxesCheck::add(std::int64_t from, std::int64_t to, const Eigen::Matrix3
   constexpr double kLeast = 0.2 * M_PI / 180.0;  // rad, as much as bias and noise give
   constexpr double kKept = 60.0 * M_PI / 180.0;  // rad, thrice what suffices
   const Pair pair{from, to, logSO3(by_gyro), logSO3(by_images)};
-  // What shakes the gyro of a robot that stands is no turn: in an hour it would outweigh the next one.
+  // Shaking turns the gyro of a standing robot alone. Counted as turns, an hour of it would outweigh the next turn.
   if (pair.by_images.norm() < kLeast) return;
   turned_ += pair.by_images.norm();
   pairs_.push_back(pair);

@@ -118,7 +118,7 @@ float EpipolarSearch::findPeriod(const cv::Point2f& left_position, double dispar
   differences.resize(static_cast<std::size_t>(count));
   blockDifferences<kHalfRows>(block, block + to_right, static_cast<std::ptrdiff_t>(images_.left_half.step[0]), count,
                               differences.data());
-  // Without a valley it is the end of the range, where refine() finds nothing but a period.
+  // Without a valley, this is the end of the range: refine() finds a period there, or nothing.
   const int shift = 2 * (lowestValley(differences, to_right).at - to_right);
   const std::optional<cv::Point2f> place = refine(images_.left, left_position, shift);
   return place && std::abs(place->y) <= options_.max_epipolar_residual ? std::abs(place->x) : 0.f;

@@ -39,8 +39,8 @@ void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) 
 
 const OldKeyframe* KeyframeMemory::nearest(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
                                            int least) const {
-  constexpr double kFarthest =
-      3.0;  // baselines (chosen): from there, a disparity's error moves a point in the image by three times itself
+  // Baselines (chosen): from so far away, the error of a disparity moves a point in the image by three times as much.
+  constexpr double kFarthest = 3.0;
   const Eigen::Vector3d here = T_camera_origin.inverse().translation();
   const OldKeyframe* nearest = nullptr;
   double least_distance = kFarthest * camera.baseline;

@@ -115,7 +115,7 @@ class LocalMap {
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
     std::vector<int> rejected;                      ///< features of the newest pair
-    double newest_square = 0.0;  ///< median square of the newest pair's residuals, in sigmas, as of two numbers
+    double newest_square = 0.0;  ///< median of the newest pair's squared residuals, in sigmas; as chi-square of two
     int newest_measured = 0;     ///< number of these residuals
   };
   /// Bundle adjustment over all frames, which begins and ends with `calibration`. Outliers among the newest pair's

@@ -58,11 +58,11 @@ struct RigEstimate {
   /// Derivative of the calibration that disparities show, px, by the rig. While the camera turns at `rate` (rad/s about
   /// its axes), a right camera that is late has rotated by that for each second of delay.
   static CalibrationByRig calibrationByRig(const StereoCamera& camera, const Eigen::Vector3d& rate) {
-    CalibrationByRig shape = CalibrationByRig::Zero();
-    shape(0, 0) = shape(1, 1) = 1.0;
-    shape(2, kRoll) = -camera.fx;
-    shape.col(kDelay) = shape * byRotation(camera) * rate;
-    return shape;
+    CalibrationByRig by_rig = CalibrationByRig::Zero();
+    by_rig(0, 0) = by_rig(1, 1) = 1.0;
+    by_rig(2, kRoll) = -camera.fx;
+    by_rig.col(kDelay) = by_rig * byRotation(camera) * rate;
+    return by_rig;
   }
 
   /// The rig whose disparities err by a calibration, and whose right images are late by `delay`, s.

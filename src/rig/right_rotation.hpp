@@ -19,7 +19,7 @@ struct RightRotation {
   /// Sandwich (White 1980) over parts of the image, within which errors are correlated.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   /// Covariance, rad^2, by errors of rectification of 1 px (root mean square). It is that of random rotations
-  /// which shift the measured disparities or rows by as much, with the covariance's shape of their noise.
+  /// which shift the measured disparities or rows by as much, with a covariance of the same shape as by noise.
   Eigen::Matrix3d by_pixel = Eigen::Matrix3d::Zero();
 };
 

@@ -78,7 +78,7 @@ class RollingShutter {
     begin(options);
   }
 
-  /// For another camera: the options' readout is used, or 0 until one is estimated. What motions are like stays.
+  /// For another camera: the options' readout is used, or 0 until one is estimated. The learnt acceleration stays.
   void begin(const CalibrationOptions& options) {
     readout_ = options.readout;
     is_estimated_ = options.enabled && readout_ == 0.0;

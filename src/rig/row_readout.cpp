@@ -13,8 +13,8 @@
 namespace sdvo {
 namespace {
 
-const double kKernelSquare =
-    noiseGate(2) * NoiseOptions().corner * NoiseOptions().corner;  // px^2, of Cauchy's kernel: by the default corner
+/// px^2, of Cauchy's kernel, by the default noise of corners.
+const double kKernelSquare = noiseGate(2) * NoiseOptions().corner * NoiseOptions().corner;
 constexpr std::size_t kAround = 4;  // pairs before and after one, whose mean rates give the slow rate there
 
 /// How a feature's position (u_left, v_left), px, depends on pose and readout.

@@ -9,7 +9,7 @@
 
 namespace sdvo {
 
-/// What a fuzzer came up with, taken from its front piece by piece; all zeros after its end.
+/// A fuzzer's input. Its bytes are taken from the front, piece by piece; after its end come zeros.
 class FuzzBytes {
  public:
   FuzzBytes(const std::uint8_t* data, std::size_t size) : next_(data), end_(data + size) {}

@@ -42,8 +42,8 @@ struct NoiseOptions {
   double cornerGate() const { return corner * std::sqrt(noiseGate(1)); }
 
   /// Standard deviation, in each direction, of a corner that no patch confirms, px. It may lie anywhere in the disc
-  /// where u_left and u_right are within the gate:
-  /// its radius is the gate / sqrt(2), and the deviation in each direction half of that.
+  /// where u_left and u_right are within the gate. The disc's radius is the gate / sqrt(2); the deviation in each
+  /// direction is half of that.
   double unconfirmedCorner() const { return inlierGate() / std::sqrt(8.0); }
 };
 

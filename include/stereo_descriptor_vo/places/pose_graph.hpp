@@ -22,7 +22,7 @@ struct GraphEdge {
   Eigen::Isometry3d T_from_to = Eigen::Isometry3d::Identity();
   Matrix6d covariance = Matrix6d::Identity();  ///< of its right perturbation, without drift, m and rad
   double length = 0.0;  ///< distance travelled between the nodes, m; zero for a loop as it was found
-  double turn = 0.0;    ///< sum of the rotation angles between them, rad; the same
+  double turn = 0.0;    ///< sum of the rotation angles between them, rad; zero for a loop as it was found
 };
 
 /// The shortest path between two nodes.

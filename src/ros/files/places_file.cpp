@@ -194,8 +194,7 @@ SavedPlaces read(const std::string& path) {
       const auto place = parse<msgs::Place>(message);
       if (is_old && place.features.descriptor == "freak")
         throw std::invalid_argument(
-            "its FREAK descriptors are of 0.1.0, whose bits compare other fields: drive there "
-            "again");
+            "its FREAK descriptors are of 0.1.0, whose bits compare other fields: drive there again");
       places.push_back(ros_conversions::fromMessage(place));
       if (!stream) stream = ros_conversions::streamOf(place.features);
       const StereoFeatures &first = places.front().features, &last = places.back().features;
