@@ -30,6 +30,9 @@ namespace {
 const std::vector<std::string> kFixed = {"detector/type=fast", "detector/min_spacing=0",
                                          "stereo/max_epipolar_residual=1.5", "descriptor/extend_border=true"};
 
+/// The same of SIFT; FREAK's are a difference.
+const std::vector<std::string> kSiftSizes = {"size_curve/slope=0.2", "size_curve/min_size=4", "size_curve/max_size=32"};
+
 /// The same for fields without a name. Corners are of at least 3 grey levels in every image: a loose threshold, by
 /// which the paper's largest sets have 2320 features.
 void fix(ExperimentOptions& options) {
@@ -56,13 +59,15 @@ std::vector<Ablation> ablations() {
 }
 
 ExperimentOptions ExperimentSetup::options() const {
-  const auto read = [this](bool freak) {
+  const auto read = [this](DescriptorType type) {
     // A loose threshold, as in the paper: weak corners belong to the large feature sets.
     std::vector<std::string> all = {"stereo_features/detector/max_features=5000", "detector/min_contrast=6"};
     if (setup == Setup::kPaper) {
       all.insert(all.end(), kFixed.begin(), kFixed.end());
       for (const SetupDifference& difference : paperDifferences())
-        if (freak || !difference.of_freak) all.insert(all.end(), difference.with.begin(), difference.with.end());
+        if (type == DescriptorType::kFreak || !difference.of_freak)
+          all.insert(all.end(), difference.with.begin(), difference.with.end());
+      if (type == DescriptorType::kSift) all.insert(all.end(), kSiftSizes.begin(), kSiftSizes.end());
     }
     all.insert(all.end(), settings.begin(), settings.end());
     ExperimentOptions options{readPipelineOptions("", all)};
@@ -70,8 +75,7 @@ ExperimentOptions ExperimentSetup::options() const {
     if (setup == Setup::kPaper) fix(options);
     return options;
   };
-  const bool freak = read(true).stereo_features.descriptor.type == DescriptorType::kFreak;
-  return read(freak);
+  return read(read(DescriptorType::kFreak).stereo_features.descriptor.type);
 }
 
 ExperimentSetup ExperimentSetup::withDescriptor(DescriptorType type) const {

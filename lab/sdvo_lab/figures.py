@@ -53,8 +53,13 @@ def page_errors(entries):
         elif marks.commit(texts[page], mark) != entry.get("commit"):
             yield f"{page}: the table {mark} has not the commit of lab/figures.yaml: lab/run figures --only NAME writes both"
     for name, entry in entries.items():
-        if "heading" in entry and not re.search(rf"^#+ {re.escape(entry['heading'])}$", texts[entry["page"]], re.MULTILINE):
+        if "heading" not in entry:
+            continue
+        section = re.search(rf"^#+ {re.escape(entry['heading'])}$(.*?)(?=^#|\Z)", texts[entry["page"]], re.MULTILINE | re.DOTALL)
+        if not section:
             yield f"{entry['page']}: no heading {entry['heading']}, which {name} of lab/figures.yaml names"
+        elif "commit" in entry and f"*Commit {entry['commit']}.*" not in section.group(1):
+            yield f"{entry['page']}: below {entry['heading']} stands no *Commit {entry['commit']}.* of {name} in lab/figures.yaml"
 
 
 def old_errors(entries, digest):

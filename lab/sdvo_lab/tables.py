@@ -61,6 +61,16 @@ CLAIMS = {"A, SN-FREAK": ("+26.3 %", freak, "improvement_percent"), "A, SN-SIFT"
           "B, stereo FREAK": ("+19 % (text), +12.8 % (figure)", inliers, "gain_percent")}
 
 
+def path_errors(folder):
+    return [select(rows, step="1", model="refined") for rows in read(folder, "accuracy_summary.csv")]
+
+
+def from_standard_to_stereo(rows, drives):
+    """The mean error of both systems, as a cell."""
+    return " → ".join(f"{bootstrap.mean(of_drives(select(rows, system=system), drives, 'mean_path_percent')):.2f}"
+                      for system in ("standard", "stereo")) + " %"
+
+
 def headlines(folder):
     """Values by name, one of each drive."""
     return {(claim, setup, name): of_drives(rows, GROUPS[name], column) for claim, (_, of, column) in CLAIMS.items()
@@ -73,6 +83,8 @@ def headline_table(folder):
     yield ["claim", "paper", *(f"{setup} set-up, {name}" for setup, name in columns)]
     for claim, (paper, _, _) in CLAIMS.items():
         yield [claim, paper, *(percent(found[(claim, *column)]) for column in columns)]
+    errors = dict(zip(SETUPS, path_errors(folder)))
+    yield ["C, stereo FREAK", "4.78 → 3.50 %", *(from_standard_to_stereo(errors[setup], GROUPS[name]) for setup, name in columns)]
 
 
 def group_table(folder):
@@ -88,7 +100,7 @@ def ablation_table(folder):
     names = [path.name for path in (folder / "ablation").iterdir()]
     for setup in ("product", "paper"):
         for name in sorted((n for n in names if n.startswith(setup)), key=lambda n: (n != setup + " as it is", n)):
-            rows = results.read(folder / "ablation" / name / "matching.csv")
+            rows = select(results.read(folder / "ablation" / name / "matching.csv"), tolerance_px=3.0)
             means = (bootstrap.mean(of_drives(rows, results.KITTI, column)) for column in ("scale_normalised", "standard"))
             yield [setup, name[len(setup) + 1:], *(f"{mean:.1f}" for mean in means),
                    *cells([rows], ("improvement_percent", "improvement_on_best_percent"), [results.KITTI])]

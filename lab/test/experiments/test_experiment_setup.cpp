@@ -74,6 +74,15 @@ TEST(ExperimentSetup, SizesForMatchingAreFreaksAlone) {
   EXPECT_EQ(brief.sizeCurve().max_size, DepthScaleOptions{}.completedFor(DescriptorType::kBrief).max_size);
 }
 
+TEST(ExperimentSetup, SizesOfSiftAreFixed) {
+  ExperimentSetup paper;
+  paper.setup = Setup::kPaper;
+  const DepthScaleOptions sizes = paper.withDescriptor(DescriptorType::kSift).options().stereo_features.size_curve;
+  EXPECT_EQ(sizes.slope, 0.2);
+  EXPECT_EQ(sizes.min_size, 4.0);
+  EXPECT_EQ(sizes.max_size, 32.0);
+}
+
 TEST(ExperimentSetup, SettingsWinOverTheSetup) {
   ExperimentSetup setup;
   setup.setup = Setup::kPaper;
