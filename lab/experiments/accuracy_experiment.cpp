@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -22,7 +21,6 @@ namespace sdvo {
 namespace {
 
 constexpr int kSteps = 5;
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// What is done after the outlier rejection: nothing, which leaves the best sample's motion; the package's robust
 /// refinement; or that with the matches aligned, too.

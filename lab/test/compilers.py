@@ -4,7 +4,8 @@
     lab/test/compilers.py --compiler clang++-14
     lab/test/compilers.py --opencv DIR/usr/include/opencv4    # where libopencv-*-dev of another release are unpacked
 
-The flags are those of the package (-Wall -Wextra -Wpedantic -Wshadow). Only the messages' headers are built.
+The flags are those of the package (-Wall -Wextra -Wpedantic -Wshadow). Only the messages' headers are built, in a workspace of its own,
+where each source stands by itself.
 """
 import argparse
 import json
@@ -16,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-WORKSPACE = ROOT / ".catkin_ws"
+WORKSPACE = ROOT / ".catkin_ws/compilers"
 JOBS = int(os.environ.get("JOBS", str(os.cpu_count())))
 
 
@@ -24,7 +25,8 @@ def commands():
     """How CMake would compile each file of the package."""
     build = [ROOT / "scripts" / "build", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", "--force-cmake",
              "stereo_descriptor_vo_generate_messages_cpp"]
-    done = subprocess.run(build, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    environment = dict(os.environ, UNITY="OFF", WORKSPACE=str(WORKSPACE), PROGRESS="OFF")
+    done = subprocess.run(build, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode != 0:
         sys.exit(done.stdout[-2000:] + "error: the package cannot be configured")
     entries = json.loads((WORKSPACE / "build" / "compile_commands.json").read_text())
