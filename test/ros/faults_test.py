@@ -323,7 +323,7 @@ class Faults(PipelineCase):
         self.tearDown()
         self.setUp()
 
-        front = pipeline(Camera(self.namespace + '/front', self.sequence, self.clock), config=self.config(''.join('%s: {find_camera: false}\n' % block for block in ('stereo_features', 'features_image'))))
+        front = pipeline(Camera(self.namespace + '/front', self.sequence, self.clock), config=self.config('stereo_features: {find_camera: false}\n'))
         self.until(lambda: ('out', self.namespace + '/stereo_features', rospy.get_name()) in links(
             self.namespace + '/stereo_vo_manager'))
         time.sleep(3.0)
