@@ -113,8 +113,6 @@ constexpr const char* kOldPlace = "d90a2505b9172820b06c0867769c61b0";  // MD5 in
 
 /// Refuses an array longer than the rest of its message. ROS' own stream allocates it before it checks.
 struct CheckedStream : ros::serialization::Stream {
-  static const ros::serialization::StreamType stream_type = ros::serialization::stream_types::Input;
-
   explicit CheckedStream(Bytes bytes)
       : Stream(reinterpret_cast<std::uint8_t*>(const_cast<char*>(bytes.data())),
                static_cast<std::uint32_t>(bytes.size())) {}
