@@ -1,15 +1,15 @@
 // OV2SLAM, without loop closing, over a drive: ov2slam_driver DRIVE POSES PARAMETERS RATE [THREADS]. PARAMETERS is a
 // file of its parameters_files/, whose calibration is replaced by the drive's; pairs come at RATE, Hz, as its threads
-// work beside each other.
+// work beside each other. Its visualizer advertises topics, so a roscore has to run.
+#include <ros/ros.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <memory>
 #include <thread>
 
+#include "ov2slam.hpp"
 #include "recorded_drive.hpp"
-#include "slam_params.hpp"
-#include "src/ov2slam.cpp"
 
 namespace {
 
@@ -38,6 +38,8 @@ int main(int count, char** words) {
     std::fprintf(stderr, "usage: ov2slam_driver DRIVE POSES PARAMETERS RATE [THREADS]\n");
     return 2;
   }
+  ros::init(count, words, "ov2slam_driver", ros::init_options::NoSigintHandler);
+  ros::NodeHandle node("~");
   RecordedDrive drive(words[1]);  // OV2SLAM takes images that it may change
   const double rate = std::atof(words[4]);
   cv::setNumThreads(count > 5 ? std::atoi(words[5]) : 1);
@@ -47,7 +49,7 @@ int main(int count, char** words) {
   parameters->buse_loop_closer_ = false;
   parameters->bforce_realtime_ = false;  // no pair is dropped
 
-  auto visualizer = std::make_shared<RosVisualizer>();
+  auto visualizer = std::make_shared<RosVisualizer>(node);
   SlamManager slam(parameters, visualizer);
   std::thread thread(&SlamManager::run, &slam);
   while (!slam.bis_on_) usleep(1000);
