@@ -122,7 +122,7 @@ int recordedPair(const std::string& guise, int i, int pairs) {
 class Guises : public testing::TestWithParam<std::tuple<std::string, std::string>> {};
 
 TEST_P(Guises, LoseNothingAndMoveAlike) {
-  const std::string &name = GetParam().first, &guise = GetParam().second;
+  const std::string &name = std::get<0>(GetParam()), &guise = std::get<1>(GetParam());
   const Source& source = sources().at(name);
   if (!std::getenv(source.variable))
     GTEST_SKIP() << source.variable << " is not set: guises of a real drive are not run";
