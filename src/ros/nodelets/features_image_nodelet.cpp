@@ -59,7 +59,8 @@ class FeaturesImageNodelet : public RobotNodelet {
   void begin() override {
     ros::NodeHandle master_nh = addThread().serve(getNodeHandle());  // what may wait for the master
     nh_ = addThread().serve(getNodeHandle());
-    finds_camera_ = nh_.param("stereo_features/find_camera", nh_.getNamespace() != "/");
+    finds_camera_ = getPrivateNodeHandle().param("find_camera",
+                                                 nh_.param("stereo_features/find_camera", nh_.getNamespace() != "/"));
     finder_ = std::make_unique<CameraFinder>(nh_.getNamespace(), nh_.resolveName("left/image_rect"),
                                              nh_.resolveName("right/image_rect"));
     transport_ = std::make_unique<StereoImageTransport>(getPrivateNodeHandle());
