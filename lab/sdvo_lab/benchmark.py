@@ -173,7 +173,7 @@ def allocations(_):
 
 def latency(_):
     """Both nodelets in one process with the camera, as they would be in its manager."""
-    yield ["Hz", "pairs", "poses", "dropped", "core, median [ms]", "stamp → odom", "over the core", "… p95"]
+    yield ["Hz", "pairs", "poses", "dropped", "core, median [ms]", "stamp → odom [ms]", "over the core, median [ms]", "… p95 [ms]"]
     setup, port = programs.ROOT / ".catkin_ws/devel/setup.sh", 11399
     command, sequence = programs.program("measure_latency"), drives.recorded("kitti", "06").directory
     with tempfile.TemporaryDirectory() as home:
