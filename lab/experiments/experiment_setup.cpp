@@ -30,7 +30,7 @@ namespace {
 const std::vector<std::string> kFixed = {"detector/type=fast", "detector/min_spacing=0",
                                          "stereo/max_epipolar_residual=1.5", "descriptor/extend_border=true"};
 
-/// The same of SIFT; FREAK's are a difference.
+/// SIFT's sizes in the paper's set-up; those of FREAK stand among its differences.
 const std::vector<std::string> kSiftSizes = {"size_curve/slope=0.2", "size_curve/min_size=4", "size_curve/max_size=32"};
 
 /// The same for fields without a name. Corners are of at least 3 grey levels in every image: a loose threshold, by

@@ -5,8 +5,8 @@ said then (lab/run golden digest). Hours; a table is recorded as soon as it is w
     lab/run figures --only errors guises    # these, whatever their digest is
     lab/run figures --list                  # commits of all tables, and which are old
 
-The digest does not see a change of places, of the renderer, of the experiments or of what a fault alone shows: name their tables with --only after one. Tables without marks
-are copied by hand, and so are their entries."""
+The digest does not see a change of places, of the renderer, of the experiments or of what a fault alone shows: name their tables with
+--only after one. Tables without marks are copied by hand, and so are their entries."""
 import os
 import re
 import shlex
