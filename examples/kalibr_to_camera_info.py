@@ -11,9 +11,13 @@ import math
 import os
 import sys
 
-import cv2
 import numpy as np
 import yaml
+
+try:
+    import cv2
+except ImportError:
+    sys.exit('error: rectifying needs OpenCV for Python (python3-opencv)')
 
 WIDEST = 110.0  # deg; at the edge a pixel sees a third (cos^2) of the angle that one in the middle sees
 

@@ -120,12 +120,12 @@ Trajectory OfflineRun::poses() const {
   return poses;
 }
 
-StampedTrajectory OfflineRun::stampedPoses() const {
+StampedTrajectory OfflineRun::stamped(const Trajectory& poses) const {
   StampedTrajectory trajectory;
-  for (const auto& [odometry, extraction, total_time] : frames_) {
-    if (!odometry.has_pose) continue;
-    trajectory.stamps.push_back(odometry.stamp);
-    trajectory.poses.push_back(odometry.T_origin_camera);
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (!frames_[i].odometry.has_pose) continue;
+    trajectory.stamps.push_back(frames_[i].odometry.stamp);
+    trajectory.poses.push_back(poses.at(i));
   }
   return trajectory;
 }

@@ -58,8 +58,8 @@ class OfflineRun {
 
   /// Poses of the left camera, one for each pair: without one of its own a pair repeats the last one.
   Trajectory poses() const;
-  /// The poses there are, with their stamps.
-  StampedTrajectory stampedPoses() const;
+  /// Of a pose for each pair, those of pairs that have one of their own, with their stamps.
+  StampedTrajectory stamped(const Trajectory& poses) const;
 
   /// A CSV with a line for each pair: times, counts, state and its reason, in which semicolons stand for commas.
   void writeTiming(const std::string& path) const;

@@ -104,8 +104,9 @@ std::vector<SelfCheck> checkItself(const Recording& recording, const Drive& driv
   return checks;
 }
 
-void writePoses(const std::string& path, const std::string& format, const OfflineRun& run) {
-  format == "tum" ? writeTumPoses(path, run.stampedPoses()) : writeKittiPoses(path, run.poses());
+/// `poses`: of each pair.
+void writePoses(const std::string& path, const std::string& format, const OfflineRun& run, const Trajectory& poses) {
+  format == "tum" ? writeTumPoses(path, run.stamped(poses)) : writeKittiPoses(path, poses);
 }
 
 void printSummary(const OfflineRun& run, PipelineOptions options) {
@@ -194,12 +195,17 @@ std::string nameOf(const std::string& input) {
   return path.extension() == ".bag" ? path.stem().string() : path.filename().string();
 }
 
+/// Below --output, without extension.
+std::string baseOf(const Arguments& arguments) {
+  return (fs::path(arguments.output) / nameOf(arguments.inputs.front())).string();
+}
+
 /// NAME.txt, NAME.csv and report.csv, for people and for run_many, which joins these reports.
 void writeResults(const Drive& drive, const std::vector<SelfCheck>& checks, PipelineOptions options,
                   const Arguments& arguments) {
   const OfflineRun& run = drive.whole;
-  const std::string name = nameOf(arguments.inputs.front()), base = (fs::path(arguments.output) / name).string();
-  writePoses(base + ".txt", arguments.format.empty() ? "tum" : arguments.format, run);
+  const std::string name = nameOf(arguments.inputs.front()), base = baseOf(arguments);
+  writePoses(base + ".txt", arguments.format.empty() ? "tum" : arguments.format, run, run.poses());
   run.writeTiming(base + ".csv");
   fs::remove(base + ".self_check.csv");  // of an earlier run
   std::string rows = std::string(SelfCheck::columns()) + "\n";
@@ -222,8 +228,9 @@ void refuseOutputsThatReplace(const Arguments& arguments) {
   for (const auto& recordings : {arguments.inputs, arguments.before})
     for (const std::string& recording : recordings)
       if (const auto poses = findKittiPoses(recording)) take(*poses);
-  for (const std::string& output :
-       {arguments.poses, arguments.odometry, arguments.timing, arguments.states, arguments.keyframes, arguments.page})
+  const std::string results = arguments.output.empty() ? "" : baseOf(arguments) + ".txt";
+  for (const std::string& output : {arguments.poses, arguments.odometry, arguments.timing, arguments.states,
+                                    arguments.keyframes, arguments.page, results})
     if (!output.empty() && !take(output) && fs::is_regular_file(output))
       throw std::runtime_error("'" + output + "' has true poses, or is another output: give another name");
 }
@@ -255,11 +262,9 @@ void prepareFolders(const Arguments& arguments) {
 
 /// The files that are asked for, each by its name.
 void writeFiles(const OfflineRun& run, const PlaceRun* places, const Arguments& arguments) {
-  if (places)
-    writeKittiPoses(arguments.poses, places->poses());
-  else if (!arguments.poses.empty())
-    writePoses(arguments.poses, arguments.format, run);
-  if (!arguments.odometry.empty()) writePoses(arguments.odometry, arguments.format, run);
+  if (!arguments.poses.empty())
+    writePoses(arguments.poses, arguments.format, run, places ? places->poses() : run.poses());
+  if (!arguments.odometry.empty()) writePoses(arguments.odometry, arguments.format, run, run.poses());
   if (!arguments.timing.empty()) run.writeTiming(arguments.timing);
   if (!arguments.states.empty()) run.writeStates(arguments.states);
   if (!arguments.keyframes.empty()) places->writeKeyframes(arguments.keyframes);
@@ -296,7 +301,7 @@ int run(const Arguments& arguments) {
   places ? printSummary(run, *places, way + run.distance()) : printSummary(run, options);
   if (places && !arguments.truth.empty()) printErrors(places->errors(wholeTruth(*recording, run, arguments.truth)));
   if (drive.left_out > 0) std::cout << drive.left_out << " stamps without a usable pair\n";
-  if (drive.left_out > 0 && !arguments.poses.empty() && (places || arguments.format != "tum"))
+  if (drive.left_out > 0 && !arguments.poses.empty() && arguments.format != "tum")
     std::cerr << "note: lines of --poses are of used pairs alone: where a truth has a line for each image, --format tum "
                  "compares by stamps" << std::endl;
   if (!run.mosaic().empty()) std::cerr << "warning: " << run.mosaic() << std::endl;
@@ -342,10 +347,10 @@ int main(int argc, char** argv) {
   app.add_option("--live", arguments.live, "page: bag with vo_info of the drive as it ran; default: the recording")
       ->check(CLI::ExistingFile);
   app.add_option("--pictures", arguments.pictures, "folder of pictures to write: each left image with its features");
-  app.add_option("--poses", arguments.poses, "poses to write, 12 numbers a line");
+  app.add_option("--poses", arguments.poses, "poses to write, by --format");
   app.add_option(
          "--format", arguments.format,
-         "of the poses: tum (those there are, with stamps; default of --output) or kitti (12 numbers a line for "
+         "of all poses: tum (those there are, with stamps; default of --output) or kitti (12 numbers a line for "
          "each pair; default of --poses)")
       ->check(CLI::IsMember({"tum", "kitti"}));
   app.add_option("--timing", arguments.timing,
@@ -363,7 +368,7 @@ int main(int argc, char** argv) {
   app.add_flag("--places", arguments.places, "recognises places, too: --poses are those in the map");
   app.add_option("--before", arguments.before, "places: recordings of other places driven before; repeatable")
       ->allow_extra_args(false);
-  app.add_option("--odometry", arguments.odometry, "places: poses of the odometry to write, 12 numbers a line");
+  app.add_option("--odometry", arguments.odometry, "places: poses of the odometry to write, by --format");
   app.add_option("--keyframes", arguments.keyframes, "places: CSV to write, a line for each key frame");
   app.add_option(
       "--ground-truth", arguments.truth,

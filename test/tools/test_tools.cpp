@@ -306,7 +306,12 @@ TEST_F(Tools, TruePosesAreNoOutput) {
   expectError(run("run_sequence", drive_ + " --page " + in("page.html") + " --ground-truth " + truth.string() +
                                       " --poses " + truth.string()),
               words);
-  EXPECT_EQ(readText(beside), readText(truth));
+  const fs::path named = root_ / (sequence_.filename().string() + ".txt");  // what --output writes there
+  fs::copy_file(truth, named);
+  expectError(run("run_sequence", drive_ + " --page " + in("page.html") + " --ground-truth " + named.string() +
+                                      " --format kitti --output " + root_.string()),
+              words);
+  for (const fs::path& path : {beside, named}) EXPECT_EQ(readText(path), readText(truth));
 }
 
 TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {
@@ -354,7 +359,7 @@ TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
 
 TEST_F(Tools, PlacesByASwitch) {
   const auto arguments = [this](const std::string& name) {
-    return drive_ + " --poses " + in(name + ".txt") + " --odometry " + in("poses.txt") + " --keyframes " +
+    return drive_ + " --poses " + in(name + ".txt") + " --odometry " + in(name + "_odometry.txt") + " --keyframes " +
            in(name + ".csv") + " --ground-truth " + in("truth.txt") + " --before " + drive_ +
            " --param place_recognition/keyframe_distance=0.15";  // m, below a step
   };
@@ -364,9 +369,11 @@ TEST_F(Tools, PlacesByASwitch) {
   EXPECT_TRUE(contains(named.out, "\nrevisits ")) << named.out;
   EXPECT_EQ(linesIn("named.txt").size(), static_cast<std::size_t>(kPairs));
   EXPECT_EQ(linesIn("named.csv").size(), 2u * kPairs + 1u);
-  const std::string odometry = poses();
-  EXPECT_EQ(posesOf(drive_), odometry);
+  EXPECT_EQ(posesOf(drive_), readText(in("named_odometry.txt")));
   expectError(run("run_sequence", arguments("neither")), "need --places");
+  ASSERT_EQ(run("run_sequence", "--places --format tum " + arguments("stamped")).exit_code, 0);
+  for (const std::string name : {"stamped.txt", "stamped_odometry.txt"})
+    EXPECT_EQ(numbersOf(linesIn(name).at(1)).size(), 8u) << name;
 }
 
 TEST_F(Tools, TimingEndsWithTheReasonWithoutCommas) {

@@ -276,7 +276,7 @@ class PlaceDiagnostics {
       finding = silence->asWarning();  // the fault is the odometry's
     else if (last_ && !last_->located)
       finding = {Verdict::kWarn,
-                 "none of the places that were loaded has been recognised yet, so there is no map -> odom",
+                 "no recognised place shows yet where in the map the robot is: map -> odom is that of initialpose, or missing",
                  "drive where the robot has been, or give a pose on initialpose"};
     Findings findings = unused_.judge(std::move(finding), values);
     if (!last_) return findings;
