@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <random>
 
+#include "draws.hpp"
 #include "said.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
@@ -167,7 +168,7 @@ inline World randomWorld(unsigned seed, int count, const Eigen::Vector3d& low, c
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
   World world;
   for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d share(uniform(random), uniform(random), uniform(random));
+    const Eigen::Vector3d share = draw<3>(uniform, random);
     world.points.push_back(low + share.cwiseProduct(high - low));
     world.rows.push_back(randomRow(random, bytes));
   }
@@ -211,9 +212,11 @@ inline StereoFeatures observe(const World& world, const StereoCamera& rig, const
           if (uniform(random) < sighting.flipped) byte = static_cast<std::uint8_t>(byte ^ (1 << bit));
     addFeature(features, pixel[0], pixel[1], disparity, row);
   }
-  for (int i = 0; i < sighting.strangers; ++i)
-    addFeature(features, uniform(random) * (rig.width - 1.0), uniform(random) * (rig.height - 1.0),
-               1.0 + 40.0 * uniform(random), randomRow(random, static_cast<int>(world.rows.front().size())));
+  for (int i = 0; i < sighting.strangers; ++i) {
+    const std::vector<std::uint8_t> row = randomRow(random, static_cast<int>(world.rows.front().size()));
+    const Eigen::Vector3d share = draw<3>(uniform, random);
+    addFeature(features, share.x() * (rig.width - 1.0), share.y() * (rig.height - 1.0), 1.0 + 40.0 * share.z(), row);
+  }
   return features;
 }
 

@@ -7,6 +7,7 @@
 
 #include "../../src/common/kernel.hpp"
 #include "../../src/map/window_optimizer.hpp"
+#include "../draws.hpp"
 #include "../synthetic_features.hpp"
 
 namespace sdvo::test_window_optimizer {
@@ -156,7 +157,7 @@ void addNoise(Window& window, double position, double disparity, std::uint32_t s
   std::normal_distribution<double> normal;
   for (WindowObservation& observation : window.observations)
     observation.measurement +=
-        Eigen::Vector3d(position * normal(random), position * normal(random), disparity * normal(random));
+        Eigen::Vector3d(position, position, disparity).cwiseProduct(synthetic::draw<3>(normal, random));
 }
 
 /// A kernel that bends far out: plain least squares.
@@ -232,12 +233,13 @@ Window windowOfTheModel(int frames, double factor, double outliers, double share
         auto pixel = predictObservation(window.camera, window.T_camera_origin[static_cast<std::size_t>(f)], point);
         if (!pixel || !window.camera.sees(*pixel)) continue;
         const double sigma = factor * kPositionSigma * (uniform(random) < outliers ? 20.0 : 1.0);
-        *pixel += Eigen::Vector3d(sigma * normal(random), sigma * normal(random),
-                                  common + shipped.noise.disparity * normal(random));
+        const Eigen::Vector3d noise = synthetic::draw<3>(normal, random);
+        *pixel +=
+            Eigen::Vector3d(sigma * noise.x(), sigma * noise.y(), common + shipped.noise.disparity * noise.z());
         if (shared > 0.0) {
           const auto part = [&](double ray) { return static_cast<int>(std::floor(350.0 * ray / side)); };
           const auto& ray = point.ray_and_inverse_depth;
-          const Eigen::Vector2d error(shared * normal(random), shared * normal(random));
+          const Eigen::Vector2d error = shared * synthetic::draw<2>(normal, random);
           pixel->head<2>() += of_parts.try_emplace({f, part(ray.x()), part(ray.y())}, error).first->second;
         }
         seen.push_back({{*pixel, kPositionSigma}, static_cast<int>(window.points.size()), f});

@@ -27,8 +27,9 @@ inline SeenPoints seenPoints(unsigned seed, int count, double noise = 0.0, doubl
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
   std::normal_distribution<double> normal(0.0, 1.0);
   for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d point = camera.backProject(40.0 + 560.0 * uniform(random), 40.0 + 400.0 * uniform(random),
-                                                     6.0 + 30.0 * uniform(random));
+    const Eigen::Vector3d share = synthetic::draw<3>(uniform, random);
+    const Eigen::Vector3d point =
+        camera.backProject(40.0 + 560.0 * share.x(), 40.0 + 400.0 * share.y(), 6.0 + 30.0 * share.z());
     Eigen::Vector3d measurement = camera.project(trueMotion() * point);
     for (int k = 0; k < 3; ++k) measurement[k] += noise * normal(random);
     if (i < outlier_share * count) {

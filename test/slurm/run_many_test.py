@@ -115,7 +115,7 @@ class RunMany(unittest.TestCase):
         cls.bags.mkdir()
         for name, frames in (("killed", 60), ("short", 5)):
             subprocess.run([TOOLS / "convert", drive, "--frames", str(frames), "--output", cls.bags / (name + ".bag")], **quiet)
-        (cls.folder / "vo.yaml").write_text("visual_odometry: {motion: {seed: 5}}\n")  # found from where the command is given
+        (cls.folder / "vo.yaml").write_text("visual_odometry: {map: {keyframes: 7}}\n")  # found from where the command is given
         (cls.bags / "damaged.bag").write_bytes((cls.bags / "short.bag").read_bytes()[:5000])
 
     def start(self, results, *options):
