@@ -132,9 +132,11 @@ struct OdometryOutputOptions {
              "world-fixed frame of the base's true pose on TF: the odometry starts there, and topic ground_truth_error "
              "has its error; empty: none");
     list.add("ground_truth_base_frame_id", ground_truth_base_frame_id,
-             "the base below ground_truth_frame_id; needed with publish_tf, as a frame on TF has one parent; empty: base_frame_id");
+             "the base below ground_truth_frame_id; needed with publish_tf, as a frame on TF has one parent; empty: "
+             "base_frame_id");
     list.add("guess_timeout", guess_timeout, {0.0, 1.0}, "s",
-             "wall time to wait at each pair for the motion by guess_frame_id or the gyro; seldom once it did not come in time");
+             "wall time to wait at each pair for the motion by guess_frame_id or the gyro; seldom once it did not come "
+             "in time");
     list.add("queue_size", queue_size, {1, 1000}, "",
              "feature messages that wait while one is processed; the newest win");
     list.add("overwrite", overwrite, "save_trajectory may replace files that were there before");
@@ -162,7 +164,8 @@ struct PlaceOutputOptions {
     list.add("queue_size", queue_size, {1, 10000}, "", "pairs that wait while one is processed; the newest win");
     list.add("places_file", places_file,
              "file of save_places to begin with, relative ones below ROS_HOME; empty: with no places");
-    list.add("save_at_shutdown", save_at_shutdown, "write the places to places_file, which it needs, each minute and at the end; not with localisation_only");
+    list.add("save_at_shutdown", save_at_shutdown,
+             "write the places to places_file, which it needs, each minute and at the end; not with localisation_only");
     list.add("overwrite", overwrite,
              "files that are none of save_places, and maps with other or more places, may be replaced");
     list.add("robot_name", robot_name, "what other robots know this one by; empty: the namespace");

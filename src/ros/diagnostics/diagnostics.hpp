@@ -276,7 +276,8 @@ class PlaceDiagnostics {
       finding = silence->asWarning();  // the fault is the odometry's
     else if (last_ && !last_->located)
       finding = {Verdict::kWarn,
-                 "no recognised place shows yet where in the map the robot is: map -> odom is that of initialpose, or missing",
+                 "no recognised place shows yet where in the map the robot is: map -> odom is that of initialpose, or "
+                 "missing",
                  "drive where the robot has been, or give a pose on initialpose"};
     Findings findings = unused_.judge(std::move(finding), values);
     if (!last_) return findings;
