@@ -4,8 +4,8 @@
 
 namespace sdvo::synthetic {
 
-/// N numbers of a distribution, the last one first. Arguments of a call that each draw one would be drawn in the order
-/// of the compiler, which on arm64 is another one than on amd64.
+/// N random numbers, the last one first, so that all compilers make the same scenes. C++ leaves the order of a call's
+/// arguments open: `f(draw(), draw())` draws in another order on arm64 than on amd64.
 template <int N, class Distribution, class Random>
 Eigen::Matrix<double, N, 1> draw(Distribution& distribution, Random& random) {
   Eigen::Matrix<double, N, 1> drawn;

@@ -49,9 +49,9 @@ void FocusCheck::add(const cv::Mat& left, const cv::Mat& right) {
 }
 
 Finding FocusCheck::judge() const {
-  // Standard deviations of the blur. Images of KITTI, Karlsruhe, EuRoC, Tsukuba and an OAK-D have at most 2 px.
-  // A hand-held 424x240 camera with noise of 1.5 grey levels keeps half of its inliers at 3 px, a tenth of them at
-  // 7 px, and is lost at 10 px.
+  // The limits are standard deviations of the blur. Images of KITTI, Karlsruhe, EuRoC, Tsukuba and an OAK-D have at
+  // most 2 px. On hand-held 424x240 images with noise of 1.5 grey levels, the odometry keeps half of its inliers at a
+  // blur of 3 px and a tenth at 7 px. At 10 px it is LOST.
   constexpr double kSoft = 4.0, kBlind = 7.0;  // px (chosen)
   constexpr double kEdges = 0.1;               // grey levels squared; of noise alone it is a tenth of that
   std::array<double, 2> blur{};

@@ -58,7 +58,7 @@ class OfflineRun {
 
   /// Poses of the left camera, one for each pair: without one of its own a pair repeats the last one.
   Trajectory poses() const;
-  /// Of a pose for each pair, those of pairs that have one of their own, with their stamps.
+  /// `poses` (one for each pair) with their stamps, without the pairs for which the odometry had no pose.
   StampedTrajectory stamped(const Trajectory& poses) const;
 
   /// A CSV with a line for each pair: times, counts, state and its reason, in which semicolons stand for commas.
