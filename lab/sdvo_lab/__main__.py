@@ -19,6 +19,7 @@ COMMANDS = {
     "figures": ("figures", "tables of the pages, made anew where the odometry is another one"),
     "golden": ("golden", "poses, states and covariances of two builds"),
     "shutters": ("shutters", "rolling shutters: ignored, estimated, known"),
+    "delays": ("delays", "right cameras that are late or early"),
     "repeats": ("repeats", "texture that repeats: walls, tiles, racks, fences, stairs"),
     "two-cameras": ("two_cameras", "two cameras of one robot, fused by robot_localization"),
     "guises": ("guises", "a drive turned, cut, spoilt or in another order"),

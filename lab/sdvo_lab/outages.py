@@ -23,6 +23,8 @@ from . import drives, marks, odometry, poses, programs
 SIGMAS = 5.0       # standard deviations that no error may exceed
 IN_VIEW = 1 / 3    # share of the points from which on an outage has to cost nothing
 EXCERPT, GAP = 8, 3  # pairs of a place, and black ones between two
+# Error of a motion between views of one place: m, ratio of the distance, rad (chosen: other places are farther off).
+SAME_DISTANCE, SAME_RATIO, SAME_ANGLE = 0.1, 0.1, 0.1
 BLACK = 2          # grey level of a covered lens
 
 
@@ -261,20 +263,34 @@ def join(all_drives, trials, random, sequence):
     return places
 
 
+def motion_between(drive, before, after, change, T_world_camera):
+    """True motion from pair `before` to pair `after` of a drive; of the right camera's mirror image in the mirrored world."""
+    motion = poses.relative(T_world_camera[before], T_world_camera[after])
+    if change is not mirrored:
+        return motion
+    T_left_right, mirror = poses.translation([drive.camera[3], 0, 0]), numpy.diag([-1, 1, 1, 1])
+    return mirror @ poses.relative(T_left_right, motion @ T_left_right) @ mirror
+
+
 def is_same(places, run, k, poses_of):
-    """Whether the pose of the sequence's pair k is right: it was last seen in the same drive, which knows its poses. One of the
-    place's pairs will do: an object that goes along with the camera misleads those after it."""
+    """Whether the pose of the sequence's pair k is right: the last place of its epoch, which may have been a while ago, is of the
+    same drive, which knows its poses. One of that place's pairs will do: an object that goes along with the camera misleads those
+    after it."""
     place_of = {place.first + j: place for place in places for j in range(EXCERPT)}
-    last = max((j for j in place_of if j < k and run.states[j].has_pose), default=k)
-    before, after = place_of[last], place_of[k]
-    if before.drive != after.drive or {before.change, after.change} & {mirrored, swapped}:
+    earlier = [j for j in place_of if j < k and run.states[j].has_pose and run.states[j].epoch == run.states[k].epoch]
+    before, after = place_of[max(earlier, default=k)], place_of[k]
+    changes = {before.change, after.change}
+    if before.drive != after.drive or swapped in changes or (mirrored in changes and changes != {mirrored}):
         return False
 
-    def sigmas(j):
-        true = poses.relative(*(poses_of[before.drive][place.numbers[i - place.first]] for place, i in ((before, j), (after, k))))
-        return max(poses.sigmas(poses.logarithm(poses.relative(true, poses.relative(run.poses[j], run.poses[k]))), run.states[k].motion))
+    def is_near(j):
+        pairs = before.numbers[j - before.first], after.numbers[k - after.first]
+        true = motion_between(before.drive, *pairs, before.change, poses_of[before.drive])
+        error = poses.logarithm(poses.relative(true, poses.relative(run.poses[j], run.poses[k])))
+        is_far = numpy.linalg.norm(error[:3]) > SAME_DISTANCE + SAME_RATIO * numpy.linalg.norm(true[:3, 3])
+        return not is_far and numpy.linalg.norm(error[3:]) <= SAME_ANGLE
 
-    return min(sigmas(j) for j in range(before.first, last + 1) if run.states[j].has_pose) <= SIGMAS
+    return any(is_near(j) for j in earlier if place_of[j] is before)
 
 
 def measure_elsewhere(all_drives, work, arguments):
