@@ -573,9 +573,11 @@ class Live(PipelineCase):
         def cpu():
             with open('/proc/%d/stat' % self.pid) as file:
                 return sum(int(word) for word in file.read().rsplit(')')[1].split()[11:13]) / os.sysconf('SC_CLK_TCK')
+        before = cpu()
         for i in range(4):
             info = self.feed_messages(*images(i, 1.0))
             self.assertEqual(info.state, 'TRACKING')
+        working = (cpu() - before) / 4
         self.features.close()  # the only other listener
         self.closeables.remove(self.features)
 
@@ -584,11 +586,11 @@ class Live(PipelineCase):
             time.sleep(0.1)
             return not self.camera.has_subscribers()
         self.until(rests)
-        answers, begin, used = len(self.info), time.monotonic(), cpu()
+        answers, before = len(self.info), cpu()
         for _ in range(200):  # longer than TF remembers
             self.camera.publish(*images(3))
             time.sleep(0.02)
-        self.assertLess((cpu() - used) / (time.monotonic() - begin), 0.05)  # of a processor
+        self.assertLess((cpu() - before) / 200, 0.2 * working)  # of a pair
         self.assertEqual(len(self.info), answers)
         self.until(lambda: 'the base stands, by wheels' in self.diagnosis('input rate').message)
         self.assertGreater(transforms_to('wheels', all_tf)[-1].header.stamp, info.header.stamp + rospy.Duration(10))
